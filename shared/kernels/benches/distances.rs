@@ -1,4 +1,5 @@
-//! Time to find the best ends of a bone: 125 positions of one joint for each of 125 positions of another, on a grid in space.
+//! Measures the time to find the best ends of a bone: for each of 125 positions of one joint, the best of 125 positions of another, on a
+//! grid in space.
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;

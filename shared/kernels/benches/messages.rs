@@ -1,5 +1,6 @@
-//! Time of one max-sum message between a part and its parent with six types each, for typical distances of trained springs. The grids are
-//! the largest level of an image of 172 x 224 pixels, the level one octave below it, and the same two levels for 640 x 480 pixels.
+//! Measures the time of one max-sum message between a part and its parent with six types each, for typical distances of trained springs.
+//! The grids are the largest level of an image of 172 x 224 pixels, the level one octave below it, and the same two levels for 640 x 480
+//! pixels.
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
 use std::hint::black_box;
@@ -116,7 +117,7 @@ fn measure(isa: Isa, rule: &MessageRule, grid: Grid, peak: f64) {
     );
 }
 
-/// The same transforms in double precision, along lower envelopes.
+/// The same transforms in double precision, computed along lower envelopes.
 fn reference(maps: &[Vec<f32>], grid: Grid) {
     let springs = springs();
     let transformed = maps.iter().zip(&springs).map(|(map, (_, spring))| {

@@ -1,7 +1,6 @@
-//! Time of the responses of 156 filters of 4x4, 5x5 and 6x6 cells on all levels of images of 172 x 224 and
-//! 640 x 480 pixels, on one thread. Prints the processor time in milliseconds, and the operations of the definition
-//! per second with their share of the measured multiply-add peak. Also prints how much longer plain
-//! sums take.
+//! Measures the time to compute the responses of 156 filters of 4x4, 5x5 and 6x6 cells on all levels of images of 172 x 224 and 640 x 480
+//! pixels, on one thread. Prints the processor time in milliseconds, the number of operations per second (as counted in the definition),
+//! and its share of the measured multiply-add peak. Also prints how much longer plain sums take.
 //!
 //! `cargo bench -p kernels --bench responses [repetitions]`
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
@@ -16,7 +15,7 @@ const N_FILTERS: usize = 156;
 fn main() {
     let repetitions = std::env::args().find_map(|arg| arg.parse().ok()).unwrap_or(20);
     for isa in Isa::available() {
-        // Without multiply-adds in hardware, this takes minutes.
+        // Without fused multiply-add instructions, this takes minutes.
         if isa == Isa::available()[0] && Isa::available().len() > 1 {
             continue;
         }

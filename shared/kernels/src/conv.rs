@@ -1,7 +1,8 @@
 //! Convolutions and sums of stacks of channels, as used by the networks that find joints.
 //!
-//! Weights are packed once. The sum of an output begins with its bias. Products are added for one block of the input's channels after the
-//! other, tap by tap along rows, channel by channel. A product and the sum to which it is added are rounded together, once.
+//! Weights are packed once. The sum of an output begins with its bias. The products are then added in a fixed order: one block of input
+//! channels after another, within it one kernel position after another along the rows, and within that one channel after another. Each
+//! product is added with a single rounding (fused multiply-add).
 
 mod blocked;
 mod fast;
@@ -53,7 +54,8 @@ pub struct Conv {
     size: ConvSize,
     /// Number of channels in a block of the input.
     width: usize,
-    /// For each block of outputs: blocks of inputs, rows, columns, channels of the block, outputs. Empty for a convolution in tiles.
+    /// The weights, in this order: blocks of outputs, blocks of inputs, rows, columns, channels of the block, outputs of the block. Empty
+    /// for a convolution in tiles.
     weights: Vec<Row>,
     /// Biases, padded with zeros to pairs of blocks like the outputs in the weights.
     bias: Vec<Row>,
@@ -61,12 +63,12 @@ pub struct Conv {
     positions: Vec<Conv>,
 }
 
-/// Stacks that a convolution or a sum writes: the plain values, the values with zeros instead of negative ones, or both.
+/// Stacks to which a convolution or a sum writes its result: the plain values, the values with negative ones replaced by zero, or both.
 #[derive(Debug)]
 pub struct Outputs<'a> {
     /// The plain values.
     pub raw: Option<&'a mut Blocked>,
-    /// The values with zeros instead of negative ones; NaN is kept.
+    /// The values with negative ones replaced by zero; NaN is kept.
     pub relu: Option<&'a mut Blocked>,
 }
 
@@ -105,7 +107,7 @@ impl Conv {
     ///
     /// # Errors
     ///
-    /// Fails with [`ConvSizeError`], also if the kernel, a stride or a number of channels is zero.
+    /// Fails with [`ConvSizeError`] if the lengths do not match, or if the kernel, a stride or a number of channels is zero.
     pub fn new(
         size: ConvSize,
         weights: &[f32],
@@ -148,8 +150,8 @@ impl Conv {
         Ok(conv)
     }
 
-    /// Packs weights for a convolution by tiles of 2 x 2 outputs, which needs 16 products instead of 36. Returns `None` unless the kernel
-    /// is 3 x 3 and the stride 1. Outputs are rounded differently from those of [`Self::new`]. The input has blocks of 16 channels.
+    /// Packs weights for a convolution in tiles of 2 x 2 outputs, which needs 16 products per tile instead of 36. Returns `None` unless the
+    /// kernel is 3 x 3 and the stride 1. Outputs are rounded differently from those of [`Self::new`]. The input has blocks of 16 channels.
     ///
     /// * `weights`: `outputs x inputs x 3 x 3`.
     ///
@@ -253,7 +255,7 @@ impl Conv {
         flat(&self.weights)
     }
 
-    /// The weight of a kernel of 1 x 1.
+    /// Returns the weight between an input and an output of a 1 x 1 convolution.
     fn plain_weight(&self, output: usize, input: usize) -> f32 {
         let n_inputs = self.size.inputs.next_multiple_of(BLOCK);
         self.packed_weights()[(output / BLOCK * n_inputs + input) * BLOCK + output % BLOCK]

@@ -1,4 +1,4 @@
-//! Responses of many filters on feature maps. They are most of the arithmetic of a search.
+//! Responses of many filters on feature maps. Most of the arithmetic of a search is done here.
 
 mod points;
 mod reference;
@@ -19,7 +19,7 @@ pub use reference::correlate_f64;
 
 /// Maximum number of filters in a panel.
 const N_LANES: usize = ROW;
-/// Numbers of pairs of points for the tiles into which a map can be cut, in ascending order.
+/// The available forms of tiles, each given by its number of pairs of interpolation points, in ascending order.
 const FORMS: [usize; 2] = [3, 4];
 /// Sides of the filters for which tiles are available, in cells.
 const TILED_SIDES: std::ops::RangeInclusive<usize> = 3..=6;
@@ -31,11 +31,11 @@ pub struct Template<'a> {
     pub rows: usize,
     /// Width in cells.
     pub cols: usize,
-    /// Weights, `rows x cols x N_CHANNELS`, channel fastest, then column.
+    /// Weights, `rows x cols x N_CHANNELS`; the channel varies fastest, then the column.
     pub weights: &'a [f64],
 }
 
-/// A padded feature map, `rows x cols x N_CHANNELS`, channel fastest, then column.
+/// A padded feature map, `rows x cols x N_CHANNELS`; the channel varies fastest, then the column.
 #[derive(Debug, Clone, Copy)]
 pub struct FeatureMap<'a> {
     /// Height in cells.
@@ -84,9 +84,9 @@ pub struct CorrelateWorkspace {
 /// The method by which the responses of a level are computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
-    /// By the sums of the definition.
+    /// Computes the sums of the definition directly.
     Direct,
-    /// In tiles, with an index into [`FORMS`].
+    /// Computes tiles; the value is an index into [`FORMS`].
     Tiles(usize),
 }
 
@@ -150,8 +150,7 @@ impl FilterBank {
         first..panels.last().map_or(0, |panel| panel.filters.end)
     }
 
-    /// Reserves memory for levels of up to `cols` placements across. Afterwards, [`Self::correlate`] does not
-    /// allocate.
+    /// Reserves memory for levels with up to `cols` placements in a row. Afterwards, [`Self::correlate`] does not allocate.
     pub fn reserve(&self, cols: usize, workspace: &mut CorrelateWorkspace) {
         for panel in &self.panels {
             for (it, pending) in workspace.pending.iter_mut().enumerate() {
@@ -167,11 +166,11 @@ impl FilterBank {
     ///
     /// `out[l][f][y][x] = sum over rows r, columns c, channels k of map_l[y + r][x + c][k] w_f[r][c][k]`
     ///
-    /// The error is at most `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`. The maximum is over the cells
-    /// less than 10 away from those under the filter, and `c` is [`Self::error_factor`]. Filters of 3 to 6 cells a side are evaluated for a
-    /// whole tile of the map at once (Winograd). Other filters, and those on very small maps, are evaluated by the definition. The method
-    /// depends only on sizes. Every response is summed in the same order, regardless of the other requested responses and of the
-    /// instruction set, so the bits are always the same.
+    /// The error is at most `c * sum over k of max |map_l[..][..][k]| * sum over r, c of |w_f[r][c][k]|`. The maximum is taken over the
+    /// cells that are less than 10 cells away from those under the filter, and `c` is [`Self::error_factor`]. Filters with sides of 3 to 6
+    /// cells are evaluated for a whole tile of the map at once (Winograd). Other filters, and those on very small maps, are evaluated by
+    /// the definition. The choice of the method depends only on the sizes. Every response is summed in the same order, whatever other
+    /// responses are requested and whatever the instruction set is, so its bits are always the same.
     ///
     /// * `out`: `levels x filters x rows x cols`, without gaps; overwritten.
     /// * Does not allocate if `workspace` has been used before or has enough [memory](Self::reserve).
@@ -224,7 +223,7 @@ impl FilterBank {
     /// Let `u = 2^-24`, and let `N` be the largest number of roundings between an input and a response. Each added product then has a
     /// relative error of at most `(1 + u)^N - 1 <= N u / (1 - N u)` (Higham, *Accuracy and Stability of Numerical Algorithms*, 2nd ed.,
     /// §3.1). The direct sum has one rounding per product and one for the weight. In a tile, the sums of absolute products are larger by a
-    /// factor that follows from the matrices, once per axis.
+    /// factor that follows from the matrices; the factor applies once per axis.
     pub fn error_factor(&self, panel: usize, size: [usize; 2]) -> f64 {
         let filter = self.panels[panel].filter;
         let (roundings, growth) = match self.panels[panel].method(size) {
@@ -293,7 +292,7 @@ impl Panel {
     }
 }
 
-/// Estimated cost of both transforms of a value, in products; only used to choose a method.
+/// Estimated cost of transforming a value there and back, expressed as a number of products; only used to choose a method.
 const TRANSFORMS: usize = 10;
 
 struct Correlate<'a, I> {
@@ -374,7 +373,7 @@ fn make_room(row: &mut Vec<Row>, cols: usize) {
     row.resize(row.len().max(cols + N_LANES), Row::ZERO);
 }
 
-/// Splits `total` cells into blocks of at most `largest`, as equal as possible.
+/// Splits `total` cells into blocks of at most `largest` cells, with sizes as equal as possible.
 #[inline(always)]
 fn blocks(total: usize, largest: usize) -> impl Iterator<Item = Range<usize>> {
     let n = total.div_ceil(largest);

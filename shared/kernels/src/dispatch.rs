@@ -19,7 +19,7 @@ pub fn dispatch(isa: Isa, body: impl Body) {
     isa.run(Plain(body));
 }
 
-/// A kernel without explicit registers.
+/// A kernel that does not use registers explicitly.
 struct Plain<B>(B);
 
 impl<B: Body> Kernel for Plain<B> {

@@ -1,9 +1,9 @@
-//! Finds the best of many points at about a given distance from each of many others, in double precision.
+//! For each of many points, finds the best of many other points at about a given distance, in double precision.
 
 use crate::dispatch::{Body, dispatch};
 use crate::isa::Isa;
 
-/// Points with scores, stored by coordinate, so that several can be evaluated at a time.
+/// Points with scores, stored by coordinate, so that several can be evaluated at the same time.
 #[derive(Debug, Clone)]
 pub struct ScoredPoints {
     at: [Vec<f64>; 3],
@@ -11,7 +11,7 @@ pub struct ScoredPoints {
     n: usize,
 }
 
-/// A spring on a distance. Its cost is `weight * min(((distance - mean) / sd)^2 / 2, cap)`.
+/// A spring between two points, whose cost depends on their distance. Its cost is `weight * min(((distance - mean) / sd)^2 / 2, cap)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LengthSpring {
     /// Distance at which the cost is zero.
@@ -20,7 +20,7 @@ pub struct LengthSpring {
     pub sd: f64,
     /// Weight of the cost.
     pub weight: f64,
-    /// Largest cost of the spring, before its weight.
+    /// Largest cost of the spring, before multiplication by the weight.
     pub cap: f64,
 }
 
@@ -139,7 +139,8 @@ impl Body for Best<'_> {
         let mut most = [f64::NEG_INFINITY; LANES];
         let points = x.iter().zip(y).zip(z).zip(scores);
         for (totals, (((x, y), z), scores)) in all.iter_mut().zip(points) {
-            // Copies the slices. With references, the compiler handles one position after the other, which is ten times slower.
+            // The slices are copied, because with references the compiler would process one position after the other, which is ten times
+            // slower.
             let (x, y, z, scores) = (*x, *y, *z, *scores);
             let here: [f64; LANES] = core::array::from_fn(|lane| {
                 total(from, [x[lane], y[lane], z[lane]], scores[lane], &spring)
@@ -152,7 +153,7 @@ impl Body for Best<'_> {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let most = most.into_iter().fold(f64::NEG_INFINITY, larger);
         let mut of_best = all.iter().enumerate().filter_map(|(chunk, totals)| {
-            // Counts instead of searching, so that all totals are handled at once.
+            // The best totals are counted instead of searched for, so that all totals are compared at once.
             let n_best = totals.iter().filter(|total| **total == most).count();
             let lane = (n_best > 0).then(|| totals.iter().position(|total| *total == most))??;
             Some((chunk * LANES + lane, totals[lane]))

@@ -1,11 +1,11 @@
 //! The distance transform in double precision, along the lower envelope of parabolas.
 //!
 //! The method is that of Felzenszwalb & Huttenlocher, *Distance Transforms of Sampled Functions*, 2012, as in the reference programs. All
-//! values are in double precision, except the breakpoints of the envelope, which are in single precision.
+//! values are in double precision, except the breakpoints of the envelope, which are rounded to single precision.
 
 use crate::spring::{Axis, Spring};
 
-/// The best child for every parent of a plane.
+/// The best child for every position of the parent in a plane.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transformed {
     /// `max over v: plane[v] + spring(p, v)`, `rows x cols`.
@@ -46,7 +46,7 @@ pub fn transform_f64(plane: &[f64], [rows, cols]: [usize; 2], spring: &Spring) -
     out
 }
 
-/// For every parent on a line, the score and the position of the best child.
+/// For every position of the parent on a line, the score and the position of the best child.
 fn line(scores: &[f64], axis: Axis) -> Vec<(f64, usize)> {
     // Parabolas of the envelope from left to right, with the position from which each is the highest.
     let mut leaders: Vec<(usize, f32)> = Vec::with_capacity(scores.len());

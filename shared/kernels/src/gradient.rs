@@ -1,4 +1,4 @@
-//! Gradient and its orientation at every pixel, which determine the features.
+//! The gradient at every pixel and its orientation, from which the features are computed.
 
 mod fast;
 

@@ -23,16 +23,14 @@ pub const N_CHANNELS: usize = 32;
 const N_UNSIGNED: usize = N_ORIENTATIONS / 2;
 /// Upper limit of a normalised histogram entry.
 const CLIP: f64 = 0.2;
-/// Value added to the energy of a block, so that flat blocks have a norm.
+/// Value added to the energy of a block, so that the norm of a flat block is not 0.
 const FLAT: f64 = 0.0001;
 /// Weight of the texture channels, about `1 / sqrt(18)`.
 const TEXTURE: f64 = 0.2357;
 
-/// For each channel, the channel of its value when the picture is mirrored (left and right exchanged).
-///
-/// An orientation of 20 k degrees becomes one of 180 - 20 k. The texture channels belong to blocks of 2 x 2 cells;
-/// blocks to the left of the cell become blocks to its right. The mapping is its own
-/// inverse.
+/// For each channel, the channel of its value when the picture is mirrored (left and right swapped). An orientation of 20 k degrees becomes
+/// an orientation of 180 - 20 k degrees. The texture channels belong to blocks of 2 x 2 cells; blocks to the left of the cell become blocks
+/// to its right. The mapping is its own inverse.
 pub const MIRRORED_CHANNEL: [usize; N_CHANNELS] = {
     let mut to = [0; N_CHANNELS];
     let mut o = 0;
@@ -79,7 +77,7 @@ impl HogShape {
         ]
     }
 
-    /// Fills the padding of a map of `cells`, and returns the size of the inner part, if there is one.
+    /// Fills the padding of the map of an image with the given number of cells. Returns the size of the inner part, if there is one.
     fn pad_map(&self, cells: [usize; 2], map: &mut [[f32; N_CHANNELS]]) -> Option<[usize; 2]> {
         let [pad_rows, pad_cols] = self.pad;
         let [inner_rows, inner_cols] = cells.map(|cell| cell.saturating_sub(2));
@@ -185,7 +183,7 @@ mod tests {
         images_of(17.0)
     }
 
-    /// Images of which half have inexact samples, as in a resized image.
+    /// Images, half of which have samples that are not whole numbers, as in a resized image.
     fn all_images() -> impl Strategy<Value = Planes> {
         prop_oneof![images(), images_of(17.0 / 1.1)]
     }
@@ -213,7 +211,7 @@ mod tests {
             }
         }
 
-        /// Computes two images one after the other, so that no data of the first may remain.
+        /// Computes the features of two images one after the other, to test that no data of the first remain.
         #[test]
         fn every_instruction_set_gives_the_bits_of_the_reference(
             images in [all_images(), all_images()],
@@ -233,7 +231,7 @@ mod tests {
 
         #[test]
         fn a_mirrored_image_has_mirrored_features(cells in [3..9_usize, 3..9_usize], seed in any::<u64>()) {
-            // The samples give gradients that all differ, so that no orientation is tied.
+            // All gradients of these samples differ, so that no two orientations are equally good.
             let [width, height] = cells.map(|cell| 4 * cell);
             let mut state = seed | 1;
             let samples = std::iter::repeat_with(|| {

@@ -9,7 +9,7 @@ pub struct Isa(pub(crate) Kind);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// The baseline of the target. It is only fast with a fused multiply-add in hardware.
+    /// The instructions that the compilation target guarantees. It is fast only if these include a fused multiply-add.
     Portable,
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
@@ -38,7 +38,7 @@ impl Isa {
         Self(Kind::Portable)
     }
 
-    /// Returns true for the baseline of the target, which every machine has.
+    /// Returns true for [`Self::Portable`] instructions, which every machine has.
     pub fn is_portable(self) -> bool {
         self.0 == Kind::Portable
     }

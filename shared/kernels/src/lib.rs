@@ -24,7 +24,7 @@ mod planes;
 mod simd;
 mod spring;
 
-/// A size for a test: the second value is used with an interpreter (Miri), which takes a thousand times as long.
+/// A size for a test: the second value is used in the interpreter Miri, which takes a thousand times as long.
 #[cfg(test)]
 const fn sized(usual: usize, interpreted: usize) -> usize {
     if cfg!(miri) { interpreted } else { usual }

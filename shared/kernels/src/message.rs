@@ -1,9 +1,9 @@
 //! Max-sum messages: the best score of a child's subtree for every position and type of the parent.
 //!
 //! A message is computed in three steps: the generalised distance transform of Felzenszwalb & Huttenlocher 2012 for quadratic springs, the
-//! maximum over the child's types, and the addition to the parent's scores. All steps are done row by row in one sweep. The transform does
-//! not follow a lower envelope. It evaluates every candidate in a window that contains all possible winners. Cells are then independent, so
-//! each lane computes one cell.
+//! maximum over the child's types, and the addition to the parent's scores. All steps are done in a single pass over the rows. The
+//! transform does not follow a lower envelope. It evaluates every candidate in a window that contains all possible winners. Cells are then
+//! independent, so each lane of a register computes one cell.
 
 mod buffer;
 mod fast;
@@ -34,8 +34,8 @@ const MARGIN: usize = BLOCK - 1;
 
 /// The size of score planes, and their layout in memory: `margin, plane, margin, plane, .., margin`.
 ///
-/// A plane has `rows` rows of a rounded-up length, of which the first `cols` cells count.
-/// The other cells and the margins contain minus infinity.
+/// A plane has `rows` rows, whose length is rounded up; only the first `cols` cells of a row are part of the grid. The other cells and the
+/// margins contain minus infinity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     /// Height in cells.
@@ -135,8 +135,8 @@ impl MessageRule {
 
     /// Adds the child's message to every cell of the parent's score planes:
     ///
-    /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`,
-    /// where `s(p, v)` first adds the vertical part of the spring, then the horizontal part.
+    /// `parent[l][p] += max over choices (k, s) of l: (max over v: child[k][v] + s(p, v)) + bias`, where the vertical part of the spring
+    /// `s(p, v)` is added first, then the horizontal part.
     ///
     /// * `parent`: one plane per parent type, without the margin after the last plane. The minimum
     ///   and maximum score of each plane are written to `ranges`.

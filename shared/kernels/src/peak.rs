@@ -12,8 +12,8 @@ pub enum Peak {
     MaxPlus,
 }
 
-/// Number of values that share a weight, followed by the number of weights that share a value. Their product is the number of sums
-/// or maxima that are computed at once; it fits the registers of all instruction sets.
+/// Number of values that are combined with each weight, followed by the number of weights that are combined with each value. Their product
+/// is the number of sums or maxima that are computed at once. These fit into the registers of every instruction set.
 const ROWS: usize = 5;
 const WEIGHTS: usize = 2;
 /// Number of steps in a round, whose values fit in the first-level cache.
@@ -25,7 +25,7 @@ impl Peak {
     /// If the instruction set has no fused multiply-add, multiplication and addition are
     /// two operations that are counted as one.
     ///
-    /// * `rounds`: number of rounds; each takes at most a microsecond.
+    /// * `rounds`: number of rounds; each round takes at most a microsecond.
     pub fn run(self, isa: Isa, rounds: usize) -> u64 {
         match isa.0 {
             Kind::Portable => self.run_on::<4, false>(isa, rounds),
@@ -72,7 +72,7 @@ struct MaxPlus<const LANES: usize, const FUSED: bool> {
 impl<const LANES: usize, const FUSED: bool> Body for MaxPlus<LANES, FUSED> {
     #[inline(always)]
     fn run(self) {
-        // As in the messages, the add units also compare, and the multiply units are free.
+        // As in the messages, comparisons keep the add units busy, while the multiply units are free.
         let one = std::hint::black_box(1.0_f32);
         let larger = |best: f32, score: f32, cost: f32| {
             let score = if FUSED {

@@ -1,8 +1,8 @@
 //! Colour images in double precision, and functions that reduce their size.
 //!
-//! The features assign each gradient to one orientation, so a difference in the last bit can change the
-//! histogram bin. Both functions therefore add their products in exactly the order of the reference
-//! programs: down the columns first, tap after tap, then along the rows.
+//! The features assign each gradient to one orientation, so a difference in the last bit can change the histogram bin. Both functions
+//! therefore add their products in exactly the order of the reference programs: first down the columns, one sample after another, then
+//! along the rows.
 
 mod reduce;
 mod reference;
@@ -118,7 +118,7 @@ pub struct PartOfResized {
     pub y: Range<usize>,
 }
 
-/// Makes `out` the area average of `image` at `[width, height]` pixels.
+/// Reduces `image` to `[width, height]` pixels by averaging areas, and writes the result to `out`.
 ///
 /// The result is the same, bit for bit, as that of the reference programs' `resize` and of [`resize_by_taps`].
 ///
@@ -140,8 +140,7 @@ pub fn resize(
     resize_part(isa, image, &whole, workspace, out);
 }
 
-/// Makes `out` a part of the result of [`resize`] for `image`, with the same bits. The time is proportional
-/// to the size of the part.
+/// Writes a part of the result of [`resize`] for `image` to `out`, with the same bits. The time is proportional to the size of the part.
 ///
 /// # Panics
 ///
@@ -184,7 +183,7 @@ pub fn reduced(side: usize) -> usize {
     side.div_ceil(2)
 }
 
-/// Makes `out` the image at half size: five binomial taps, then every second sample.
+/// Writes the image at half size to `out`: smooths with five binomial weights, then takes every second sample.
 ///
 /// The result, including borders, is the same, bit for bit, as that of the reference programs' `reduce` and of [`reduce_by_taps`].
 ///
@@ -207,7 +206,7 @@ fn check_reduce(image: &Planes) {
 enum Border {
     First,
     Inside,
-    /// The second-to-last sample, if the input ends one sample after it.
+    /// The second-to-last output sample, if the input ends one sample after the centre of that output sample.
     Folded,
     Last,
 }
@@ -255,7 +254,7 @@ mod tests {
         bytes.take(n).collect()
     }
 
-    /// An image that already has different contents.
+    /// An image that already contains other data.
     fn used() -> Planes {
         Planes::from_samples(3, 5, vec![f64::NAN; 45])
     }
@@ -269,7 +268,7 @@ mod tests {
             seed in any::<u64>(),
         ) {
             let [width, height] = size;
-            // The pyramid uses shares near 1.
+            // The pyramid reduces images by factors near 1.
             let smaller = |value: usize, share: f64| ((value as f64 * share.sqrt()).round() as usize).max(1);
             let to = [smaller(width, share[0]), smaller(height, share[1])];
             let bytes = noise(seed, misaligned + 3 * width * height);
@@ -348,7 +347,7 @@ mod tests {
         assert!(half.data().iter().all(|value| (value - 77.0).abs() < 1e-9));
     }
 
-    /// The rows are so long that some samples are covered by less than a thousandth, others by slightly more.
+    /// The rows are so long that some samples are covered by less than a thousandth of their width, others by slightly more.
     #[test]
     fn shares_about_a_thousandth_are_treated_as_in_the_reference() {
         let all = [(1030, 1029), (2003, 2001), (2001, 1009)];

@@ -51,7 +51,7 @@ pub(crate) trait Simd: Copy {
     type Square: AsRef<[Self::V]>;
     /// Number of floats in a register; it divides half a [`Row`].
     const LANES: usize;
-    /// Number of pairs of sums that fit into the register file together with two weights and a cell.
+    /// Number of pairs of sums that fit into the registers together with two weights and a cell.
     const BLOCK: usize;
 
     /// Returns `value` in all lanes.
@@ -74,10 +74,9 @@ pub(crate) trait Simd: Copy {
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     /// `a - b`.
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
-    /// Returns `a one + b`, where `one` contains ones: a sum that runs on the multiply units, if there are any.
-    ///
-    /// Some processors compare on the add units and have separate multiply units. Sums in the form of
-    /// products leave the add units to the maxima, which doubles the candidates per cycle.
+    /// Returns `a one + b`, where `one` contains ones: a sum that is computed by the multiply units, if there are any. Some processors
+    /// compare with their add units and have separate multiply units. If sums are computed as products, the add units are free for the
+    /// maxima, which doubles the number of candidates per cycle.
     fn plus(self, a: Self::V, one: Self::V, b: Self::V) -> Self::V;
     /// Returns the larger value, or `b` if they are equal.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
@@ -93,7 +92,7 @@ pub(crate) trait Simd: Copy {
 
 /// A computation that runs with the machine's instruction set.
 pub(crate) trait Kernel {
-    /// Runs the computation. It must be `#[inline(always)]`, so that it is compiled for the set of `simd`.
+    /// Runs the computation. It must be `#[inline(always)]`, so that it is compiled for the instruction set of `simd`.
     fn run<S: Simd>(self, simd: S);
 }
 
@@ -116,7 +115,7 @@ impl Isa {
 mod tests {
     use super::*;
 
-    /// Transposes a row of numbered floats, and stores partial registers of every length.
+    /// A test that transposes a row of numbered floats, and stores partial registers of every length.
     struct Check;
 
     impl Kernel for Check {
@@ -152,7 +151,7 @@ mod tests {
         }
     }
 
-    /// Runs every operation once.
+    /// A test that runs every operation once.
     struct Arithmetic<'a>(&'a mut Vec<f32>);
 
     impl Kernel for Arithmetic<'_> {
@@ -196,7 +195,7 @@ mod tests {
         }
     }
 
-    /// Loads at every position of a row, and combines registers at every lane.
+    /// A test that loads at every position of a row, and combines registers at every lane.
     struct Places;
 
     impl Kernel for Places {

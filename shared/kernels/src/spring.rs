@@ -22,12 +22,11 @@ pub(crate) struct Axis {
     pub(crate) anchor: i32,
 }
 
-/// Number of cells by which a window is wider than in exact arithmetic. Together with the excess in
-/// [`ScoreRange::spread`](crate::ScoreRange), it ensures that rounding never makes a candidate outside the window tie with the best one
-/// inside.
+/// Number of cells by which a window is wider than exact arithmetic requires. Together with the excess in
+/// [`ScoreRange::spread`](crate::ScoreRange), it ensures that no candidate outside the window can reach the best score inside by rounding.
 const SLACK: f64 = 1e-3;
 
-/// The window of children that can be best for a parent, on one axis.
+/// The window of child positions that can be best for a parent, along one axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Reach {
     n: usize,
@@ -68,12 +67,11 @@ impl Axis {
         -(self.quadratic * d * d + self.linear * d) as f32
     }
 
-    /// Returns the window of the best child of a parent among `n` in a row.
+    /// Returns the window that contains the best child of a parent, among `n` child positions in a row.
     ///
-    /// * `spread`: largest difference between the scores of any two children. Let `c` be the best position
-    ///   of the spring, and `v0` the nearest child to it. A child at `v` loses to `v0` if
-    ///   `quadratic ((v - c)^2 - (v0 - c)^2) > spread`. All winners are thus within
-    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. If `spread` is not finite, they may be anywhere.
+    /// * `spread`: largest difference between the scores of any two children. Let `c` be the best position of the spring, and `v0` the
+    ///   nearest child to it. A child at `v` loses to `v0` if `quadratic ((v - c)^2 - (v0 - c)^2) > spread`. All winners are thus within
+    ///   `sqrt(spread / quadratic + (v0 - c)^2)` of `c`. If `spread` is not finite, winners may be anywhere.
     pub(crate) fn reach(self, n: usize, spread: f32) -> Reach {
         let centre = f64::from(self.anchor) + self.linear / (2.0 * self.quadratic);
         let square = f64::from(spread) / self.quadratic;
@@ -90,7 +88,7 @@ impl Axis {
 }
 
 impl Reach {
-    /// The children that can be best for a parent at `p`.
+    /// The child positions that can be best for a parent at `p`.
     #[inline(always)]
     pub(crate) fn window(&self, p: usize) -> Range<usize> {
         let n = self.n as isize;
@@ -106,10 +104,8 @@ impl Reach {
         first..((last + 1).clamp(0, n) as usize).max(first)
     }
 
-    /// The offsets at which at least one parent of a block can have its best child.
-    ///
-    /// For other parents of the block, such an offset may be outside the grid, but never
-    /// by more than the length of the block.
+    /// The offsets at which at least one parent position of a block can have its best child. For other positions of the block, such an
+    /// offset may lead outside the grid, but never further than the length of the block.
     pub(crate) fn offsets(&self, block: Range<usize>) -> Range<isize> {
         let (p, last) = (block.start, block.end - 1);
         // From one parent to the next, each end of the window moves forward by at most one cell, and never back. The offsets of the ends

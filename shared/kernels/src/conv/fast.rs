@@ -11,7 +11,7 @@ use crate::simd::{Kernel, Simd};
 
 /// Maximum number of pixels whose sums are computed at once.
 const MOST_PIXELS: usize = 8;
-/// Number of weights, in floats for a block of outputs, that stay in the first-level cache while the pixels are processed.
+/// Number of weights of a block of outputs that stay in the first-level cache while the pixels are processed, in floats.
 const CHUNK: usize = 4608;
 
 /// Convolves stacks whose shapes the caller has checked.
@@ -117,7 +117,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Computes the sums at `N` pixels, and moves the position behind them.
+    /// Computes the sums at `N` pixels, and moves the position to the next pixel after them.
     #[inline(always)]
     fn tile<S: Simd, const N: usize>(&mut self, simd: S, place: &mut Place) {
         let (size, from) = (&self.conv.size, self.from);
@@ -144,7 +144,7 @@ impl<'a> Layer<'a> {
             is_last: block + n_blocks == from.n_blocks(),
         };
         let rows = [size.kernel[0], size.kernel[1] * from.width];
-        // The two registers are in one block of outputs, or in two.
+        // The two registers belong to the same block of outputs or to two different blocks.
         let weights = [
             self.weights(lane, block, n_blocks),
             self.weights(lane + S::LANES, block, n_blocks),

@@ -1,4 +1,4 @@
-//! Sums of two stacks of channels, one of which may be coarser.
+//! Sums of two stacks of channels, one of which may have a lower resolution.
 
 use super::{Blocked, Outputs, relu};
 use crate::dispatch::{Body, dispatch};

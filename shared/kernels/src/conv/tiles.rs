@@ -1,8 +1,7 @@
-//! Convolutions by kernels of 3 x 3 in tiles of 2 x 2 outputs, with 16 products instead of 36.
-//!
-//! Winograd's minimal filtering F(2x2, 3x3) (Lavin & Gray 2016, section 4.1). A tile of 4 x 4 inputs is transformed, then multiplied
-//! position by position with the transformed kernel. The sums over the channels at one position are a convolution by a kernel of
-//! 1 x 1, where the tiles are the pixels. A last transform gives the outputs of the tile.
+//! Convolutions with 3 x 3 kernels in tiles of 2 x 2 outputs, with 16 products per tile instead of 36. The method is Winograd's minimal
+//! filtering F(2x2, 3x3) (Lavin & Gray 2016, section 4.1). A tile of 4 x 4 inputs is transformed, then multiplied position by position with
+//! the transformed kernel. The sums over the channels at one position are a 1 x 1 convolution in which the tiles take the place of the
+//! pixels. A last transform gives the outputs of the tile.
 
 use super::blocked::BLOCK;
 use super::fast::Layer;
@@ -26,7 +25,7 @@ pub struct Scratch {
     sums: Vec<Row>,
 }
 
-/// Returns the transformed kernels: one convolution by 1 x 1 for each position.
+/// Returns the transformed kernels: one 1 x 1 convolution for each position.
 ///
 /// * `weights`: `outputs x inputs x 3 x 3`.
 pub(super) fn positions(size: ConvSize, weights: &[f32]) -> Vec<Vec<f32>> {
@@ -72,7 +71,7 @@ impl Grid {
     }
 
     /// Offsets of the rows and of the columns of the inputs of a tile in a block. Offsets beyond the border are replaced by the end of the
-    /// border; only outputs outside of the stack depend on them.
+    /// border; only outputs outside the stack depend on them.
     fn inputs(&self, tile: usize) -> [[usize; SIDE]; 2] {
         let from = self.from;
         let corner = self.corner(tile);
@@ -130,7 +129,7 @@ struct Tiles<'a> {
     residual: Option<&'a [f32]>,
     raw: Option<&'a mut [f32]>,
     relu: Option<&'a mut [f32]>,
-    /// Position, block of channels, tile, channel of the block.
+    /// Transformed inputs, in this order: position, block of channels, tile, channel of the block.
     inputs: &'a mut [f32],
     /// Sums, in the order of `inputs`.
     sums: &'a mut [f32],
@@ -148,8 +147,8 @@ impl Strip {
         BlockedShape::new([channels, 1, self.n], 0)
     }
 
-    /// Floats from one position to the next. A block is left free, so that the values of one tile at all positions are not in the same set
-    /// of the first-level cache.
+    /// Floats from one position to the next. One block is left unused, so that the values of one tile at all positions are not in the same
+    /// set of the first-level cache.
     fn stride(self, shape: BlockedShape) -> usize {
         (shape.n_blocks() * self.n + 1) * BLOCK
     }

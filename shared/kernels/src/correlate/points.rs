@@ -7,25 +7,23 @@ const MAX_PAIRS: usize = 4;
 
 /// Points `0, p, -p, q, -q, .., infinity` for tiles of `2 pairs + 2` values, as polynomials.
 ///
-/// Correlating `d` with `g` is the transpose of multiplying polynomials, which can be done by values at
-/// points: `y = A^T ((G g) . (B^T d))`, where `A` and `G` contain the powers of the points (Winograd,
-/// *Arithmetic Complexity of Computations*, 1980; Lavin & Gray, *Fast Algorithms for Convolutional
-/// Neural Networks*, 2016). The rows of `B^T` contain the coefficients of the polynomials that vanish
-/// at all other points. The divisors are part of `G`, which is only used in double precision. With
-/// `w(z) = (z - p^2)(z - q^2)..` and `v_p(z) = w(z) / (z - p^2)`, the rows are
-/// `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`.
-/// Even and odd values of a line are therefore only combined in the last addition.
+/// Correlating `d` with `g` is the transpose of multiplying polynomials, which can be done by values at points: `y = A^T ((G g) . (B^T
+/// d))`, where `A` and `G` contain the powers of the points (Winograd, *Arithmetic Complexity of Computations*, 1980; Lavin & Gray, *Fast
+/// Algorithms for Convolutional Neural Networks*, 2016). The rows of `B^T` contain the coefficients of the polynomials that vanish at all
+/// other points. The divisors are part of `G`, which is only used in double precision. With `w(z) = (z - p^2)(z - q^2)..` and `v_p(z) =
+/// w(z) / (z - p^2)`, the rows are `w(x^2)` for 0, `x w(x^2)` for infinity, and `x^2 v_p(x^2) + p x v_p(x^2)` for `p`. The even and the odd
+/// values of a line are therefore combined only in the last addition.
 ///
 /// All numbers here are exact in single precision: the points are `1`, `2`, `1/2` for tiles of 8 and `1`, `5/2`, `5/4`, `5/16` for tiles of
 /// 10. For tiles of 10, sets of fractions up to 4 were tried. The set with `1/4` in place of `5/16` has the smallest
-///     [`amplification`](Self::amplification). The chosen set is within a twentieth of this value, and its measured error is smaller by a
-///     third. The usual `1`, `2`, `1/2`, `4` amplifies 4 times as much.
+///     [`amplification`](Self::amplification). The amplification of the chosen set is at most a twentieth larger, and its measured error is
+///     smaller by a third. The usual set `1`, `2`, `1/2`, `4` amplifies errors 4 times as much.
 #[derive(Debug, Clone)]
 pub(super) struct Points {
     pub(super) n_pairs: usize,
-    /// The positive points.
+    /// The positive interpolation points.
     pub(super) positive: [f32; MAX_PAIRS],
-    /// Coefficients of `w`, lowest first; that of the highest power is 1.
+    /// Coefficients of `w`, lowest power first; the coefficient of the highest power is 1.
     pub(super) whole: [f32; MAX_PAIRS],
     /// Coefficients of `v_p`, in the order of `whole`.
     pub(super) without: [[f32; MAX_PAIRS]; MAX_PAIRS],
@@ -64,7 +62,7 @@ impl Points {
         2 * self.n_pairs + 2
     }
 
-    /// The finite points in the order of the transformed values.
+    /// The finite interpolation points, in the order of the transformed values.
     fn finite(&self) -> Vec<f64> {
         let pairs = self.positive[..self.n_pairs].iter().map(|&positive| f64::from(positive));
         std::iter::once(0.0).chain(pairs.flat_map(|pair| [pair, -pair])).collect()
@@ -115,8 +113,8 @@ impl Points {
         (0..placements).map(row).collect()
     }
 
-    /// Upper bound of the ratio between the terms of the sums and those of the direct sum.
-    /// It is the largest `sum over a, j of |A_ij| |G_jc| |B_ja|` over placements `i` and taps `c`.
+    /// Upper bound of the ratio between the absolute terms of the sums in a tile and those of the direct sum. It is the largest `sum over
+    /// a, j of |A_ij| |G_jc| |B_ja|` over placements `i` and taps `c`.
     pub(super) fn amplification(&self, taps: usize) -> f64 {
         let (a, b) = (self.of_products(self.tile() + 1 - taps), self.of_cells());
         let g = self.of_filter(taps);
@@ -136,7 +134,7 @@ impl Points {
     }
 }
 
-/// Computes `p^n`. The library's function may round in between, and differently on another machine.
+/// Computes `p^n`. The function of the standard library may round intermediate results, and differently on another machine.
 fn power(p: f64, n: usize) -> f64 {
     std::iter::repeat_n(p, n).product()
 }
@@ -159,7 +157,7 @@ mod tests {
     use super::*;
     use crate::sized;
 
-    /// Tests that interpolation is exact: placement `i` combines tap `c` with cell `i + c` and with no other.
+    /// Tests that interpolation is exact: placement `i` combines filter cell `c` with map cell `i + c` only.
     #[test]
     fn the_matrices_correlate() {
         for n_pairs in [3, 4] {
@@ -181,7 +179,7 @@ mod tests {
         (0..a * b * c).map(move |i| (i / (b * c), i / c % b, i % c))
     }
 
-    /// Tests that these numbers are exact, since the bound does not count their roundings.
+    /// Tests that these numbers are exact, because the error bound does not include their rounding.
     #[test]
     fn all_constants_are_exact_in_single_precision() {
         for n_pairs in [3, 4] {

@@ -7,8 +7,8 @@ use crate::N_CHANNELS;
 
 /// The response map of one filter in double precision.
 ///
-/// * `cells`: `map_size[0] x map_size[1] x N_CHANNELS`, channel fastest, then column.
-/// * Returns `size[0] x size[1]` responses; the filter's top left cell is the response's cell.
+/// * `cells`: `map_size[0] x map_size[1] x N_CHANNELS`, channel fastest, then column. * Returns `size[0] x size[1]` responses; each is
+///   stored at the position of the filter's top-left cell.
 ///
 /// # Panics
 ///
@@ -101,7 +101,7 @@ fn tiled(form: &Form, filter: Template<'_>, Level { map, size }: Level<'_>) -> V
     out
 }
 
-/// Multiplies a line by `B^T`, with even and odd values separately.
+/// Multiplies a line by `B^T`, computing even and odd values separately.
 #[cfg(test)]
 fn of_cells(form: &Form, line: &[f32]) -> Vec<f32> {
     let points = &form.points;
@@ -126,7 +126,7 @@ fn of_cells(form: &Form, line: &[f32]) -> Vec<f32> {
     out
 }
 
-/// Multiplies a line by `A^T`, with points and their opposites together.
+/// Multiplies a line by `A^T`, computing each point together with its negative.
 #[cfg(test)]
 fn of_products(form: &Form, line: &[f32], placements: usize) -> Vec<f32> {
     let points = &form.points;

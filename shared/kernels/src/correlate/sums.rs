@@ -1,4 +1,4 @@
-//! Sums of products of a few cells with 32 filters: the loop with nearly all the arithmetic.
+//! Sums of products of a few cells with 32 filters: the loop that does nearly all the arithmetic.
 
 use std::borrow::Borrow;
 
@@ -6,9 +6,9 @@ use super::N_LANES;
 use crate::N_CHANNELS;
 use crate::simd::{Row, Simd};
 
-/// Either a filter's rows over the rows of a map, or one product per channel of transformed tiles.
+/// The operands of the sums: either a filter over the rows of a map, or transformed tiles with one product per channel.
 pub(super) struct Sums<'a, C> {
-    /// Cells, from the one under the first filter cell of the first sum.
+    /// Cells, starting with the one under the first filter cell of the first sum.
     pub(super) cells: &'a [C],
     /// Number of cells from one row of the map to the next.
     pub(super) stride: usize,
@@ -18,9 +18,8 @@ pub(super) struct Sums<'a, C> {
     pub(super) weights: &'a [Row],
 }
 
-/// Writes the sums at `n` neighbouring cells, 1 to `S::BLOCK`, with all filters of a cell together.
-///
-/// Each sum starts at zero and adds row by row, cell by cell, channel by channel.
+/// Writes the sums at `n` neighbouring cells (1 to `S::BLOCK`); the sums of all filters at a cell are stored together. Each sum starts at
+/// zero, and products are added row by row, cell by cell, channel by channel.
 #[inline(always)]
 pub(super) fn sums<S: Simd, C: Borrow<[f32; N_CHANNELS]>>(
     simd: S,
@@ -79,7 +78,7 @@ fn block<S: Simd, C: Borrow<[f32; N_CHANNELS]>, const N: usize>(
     }
 }
 
-/// A part of a row in the maps of consecutive filters.
+/// A stretch of a row in the maps of consecutive filters.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stretch {
     /// First index in the map of the first filter.
@@ -90,7 +89,7 @@ pub(super) struct Stretch {
     pub(super) n_filters: usize,
 }
 
-/// Transposes the values of a stretch: from filters within each cell to cells within each filter.
+/// Transposes the values of a stretch: from the order cell, filter to the order filter, cell.
 ///
 /// * `cells`: cells of the stretch, followed by up to `S::LANES - 1` unused ones.
 #[inline(always)]

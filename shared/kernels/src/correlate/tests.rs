@@ -16,7 +16,7 @@ fn noise(seed: u64, n: usize) -> Vec<f64> {
     .collect()
 }
 
-/// Filters of given sizes, and maps with a ring of cells that only some filters reach.
+/// Filters of given sizes, and maps with a border of cells that only some filters reach.
 struct Problem {
     filters: Vec<([usize; 2], Vec<f64>)>,
     maps: Vec<([usize; 2], Vec<f32>)>,
@@ -109,7 +109,7 @@ impl Problem {
     }
 }
 
-/// For each channel, the largest absolute value in the cells that are less than ten cells away from those of a placement.
+/// For each channel, the largest absolute value in the cells that are less than ten cells away from those under the filter.
 fn largest_near(level: Level<'_>, filter: [usize; 2], at: [usize; 2]) -> [f64; N_CHANNELS] {
     let near =
         |axis: usize, n: usize| at[axis].saturating_sub(9)..n.min(at[axis] + filter[axis] + 9);
@@ -125,7 +125,7 @@ fn largest_near(level: Level<'_>, filter: [usize; 2], at: [usize; 2]) -> [f64; N
     all
 }
 
-/// Checks the bound of [`FilterBank::correlate`] for all responses, and returns the largest ratio of error to bound.
+/// Checks the error bound of [`FilterBank::correlate`] for all responses, and returns the largest ratio of error to bound.
 fn share_of_bound(problem: &Problem, bank: &FilterBank, got: &[Vec<f32>]) -> f64 {
     let mut got = got.iter();
     let mut largest = 0.0_f64;
@@ -163,7 +163,7 @@ fn filters() -> impl Strategy<Value = ([usize; 2], usize)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(sized(40, 1) as u32))]
 
-    /// Uses up to 70 columns and 40 filters of mixed sizes, so that every remainder occurs.
+    /// Uses up to 70 columns and 40 filters of mixed sizes, so that incomplete blocks of every size occur.
     #[test]
     fn every_instruction_set_gives_the_bits_of_the_readable_version(
         sizes in prop::collection::vec([1..sized(12, 9), 1..sized(70, 20)], 1..sized(4, 2)),
@@ -179,7 +179,7 @@ proptest! {
         }
     }
 
-    /// Includes large terms that cancel, for which a tile is least accurate.
+    /// Includes large terms that cancel each other, for which tiles are least accurate.
     #[test]
     fn responses_keep_the_documented_error_bound(
         size in [1..sized(30, 9), 1..sized(30, 9)],
@@ -198,7 +198,7 @@ proptest! {
     }
 }
 
-/// Tests that tiles of other levels and panels never change a response.
+/// Tests that computing other levels and panels at the same time never changes a response.
 #[test]
 fn responses_do_not_depend_on_what_is_computed_together() {
     let sizes = [[7, 9], [1, 1], [21, 30], [40, 13], [2, 50]];
@@ -221,7 +221,7 @@ fn responses_do_not_depend_on_what_is_computed_together() {
     }
 }
 
-/// The worst-case bound is far above the errors for noise. This is the largest accepted factor between them.
+/// The worst-case bound is far above the errors for noise. This is the largest accepted ratio of the bound to these errors.
 #[test]
 fn the_error_bound_is_not_far_too_large() {
     for side in [1, 4, 5, 6].into_iter().take(sized(4, 2)) {
@@ -260,7 +260,7 @@ fn a_single_weight_copies_its_channel() {
     }
 }
 
-/// Tests the sizes for which each method is chosen, so that a change of the rule is noticed.
+/// Tests which method is chosen for which sizes, so that a change of the rule is noticed.
 #[test]
 fn the_method_depends_on_sizes_only() {
     assert_eq!(Problem::method([2, 5], [100, 100]), Method::Direct);

@@ -26,7 +26,7 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// Makes a form with tiles of `2 n_pairs + 2` cells a side.
+    /// Makes a form with tiles of `2 n_pairs + 2` cells along each side.
     pub(super) fn new(n_pairs: usize, filter: [usize; 2]) -> Self {
         let points = Points::new(n_pairs);
         let placements = filter.map(|side| points.tile() + 1 - side);
@@ -64,7 +64,7 @@ impl Form {
     }
 }
 
-/// Destination of a tile's responses.
+/// Position to which the responses of a tile are written.
 #[derive(Debug, Clone, Copy)]
 struct Tile {
     /// First index of the level's maps.
@@ -90,7 +90,7 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// Removes tiles that remain after a panic.
+    /// Removes tiles that were left by an earlier panic.
     pub(super) fn clear(&mut self) {
         self.tiles.clear();
     }
@@ -102,7 +102,7 @@ impl Pending {
         self.cells.resize(form.area() * TILES, Row::ZERO);
         self.products.resize(form.area() * TILES, Row::ZERO);
         self.between.resize(form.area(), Row::ZERO);
-        // Registers are read whole, so the last row has one more register.
+        // Whole registers are read, so the last row is followed by one more register.
         let n = rows * cols * GATHERED + N_LANES;
         self.gathered.resize(n.max(self.gathered.len()), Row::ZERO);
     }
@@ -114,7 +114,7 @@ pub(super) struct Answer<'a> {
     /// Index of the form in a panel's packed weights.
     form_idx: usize,
     panels: &'a [Panel],
-    /// Index of the filter whose maps are first in a level.
+    /// Index of the filter whose map is the first of a level.
     first_filter: usize,
     out: &'a mut [f32],
 }

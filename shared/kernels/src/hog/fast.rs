@@ -1,4 +1,4 @@
-//! Computes the features one row of cells at a time. A lane is a pixel for the gradients, and a cell afterwards.
+//! Computes the features one row of cells at a time. A lane of a register is a pixel for the gradients, and a cell in all later steps.
 
 use super::votes::Votes;
 use super::{CLIP, FLAT, HogShape, N_CHANNELS, N_UNSIGNED, TEXTURE};
@@ -14,11 +14,11 @@ type Lanes = [f32; LANES];
 #[derive(Debug, Default)]
 pub struct HogWorkspace {
     votes: Votes,
-    /// Rows of cells that are still needed, by row modulo 3; `N_ORIENTATIONS x stride`.
+    /// Histograms of the rows of cells that are still needed, by row number modulo 3; `N_ORIENTATIONS x stride`.
     histograms: [Vec<f32>; 3],
-    /// Energies of the cells of a row, by row modulo 2.
+    /// Energies of the cells of a row, by row number modulo 2.
     energies: [Vec<f32>; 2],
-    /// Norms of the blocks of 2 x 2 cells, stored at their upper left cell, by row modulo 2.
+    /// Norms of the blocks of 2 x 2 cells, stored at their upper left cell, by row number modulo 2.
     norms: [Vec<f32>; 2],
 }
 
@@ -44,7 +44,7 @@ impl HogWorkspace {
     }
 }
 
-/// Length of a row of cells in memory. Lanes that begin at the last cell are still inside the row.
+/// Length of a row of cells in memory. It is so long that a register that begins at the last cell is still inside the row.
 fn stride(cols: usize) -> usize {
     cols.next_multiple_of(LANES) + LANES
 }
@@ -91,7 +91,7 @@ impl Body for Hog<'_> {
 }
 
 impl HogWorkspace {
-    /// Computes the energies of a finished row of cells, and the norms of the blocks that it completes.
+    /// Computes the energies of a finished row of cells, and the norms of the blocks that are complete with this row.
     #[inline(always)]
     fn energies_of(&mut self, row: usize, stride: usize) {
         let [first, second] = &mut self.energies;
@@ -181,7 +181,7 @@ fn normalise(
     }
 }
 
-/// Half the sum of the products of `value` with each norm, each clipped. Every product is also added to `sums`.
+/// Multiplies `value` by each norm, clips each product, and returns half their sum. Every product is also added to `sums`.
 #[inline(always)]
 fn clipped_sum(value: &Lanes, norms: &[Lanes; 4], sums: &mut [Lanes; 4]) -> Lanes {
     let mut channel = [0.0; LANES];

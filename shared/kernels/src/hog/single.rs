@@ -35,7 +35,8 @@ pub(super) fn hog_f32(image: &Planes, shape: HogShape) -> Vec<f32> {
     map.concat()
 }
 
-/// Histograms of all cells. A cell sums the lower votes of the blocks above it, then the upper votes of the blocks below.
+/// Histograms of all cells. A cell adds the votes for lower cells from the blocks above it, then the votes for upper cells from the blocks
+/// below it.
 fn histograms(image: &Planes, cell_px: usize, [rows, cols]: [usize; 2]) -> Vec<Histogram> {
     let blocks: Vec<_> = (0..(rows + 1) * (cols + 1))
         .map(|at| {

@@ -1,9 +1,8 @@
 //! Votes of pixels for the cells around them.
 //!
-//! The centres of four neighbouring cells are the corners of a block of `cell_px x cell_px` pixels.
-//! These pixels vote only for these four cells. A block sums its votes, one pixel after the
-//! other, with one vector of four shares per pixel. Then every cell adds the sums of its four
-//! blocks.
+//! The centres of four neighbouring cells are the corners of a block of `cell_px x cell_px` pixels. These pixels vote only for these four
+//! cells. A block sums its votes, one pixel after the other, each multiplied by a vector of four shares, one per cell. Then every cell adds
+//! the sums of its four blocks.
 
 use super::Vote;
 use crate::Planes;
@@ -16,8 +15,7 @@ pub(super) struct Votes {
     n_blocks: usize,
     /// Shares of the pixels of a block, `[row][col]`, for the cells at its corners.
     shares: Vec<[f32; 4]>,
-    /// Gradients of a row of pixels, from the first pixel of the first block; the length is 0 where no
-    /// pixel votes.
+    /// Gradients of a row of pixels, starting with the first pixel of the first block. The length is 0 at positions without a vote.
     lengths: Vec<f32>,
     bins: Vec<u32>,
     /// Sums, `N_ORIENTATIONS x n_blocks`: upper left, upper right, lower left, lower right.
@@ -62,7 +60,7 @@ impl Votes {
         }
     }
 
-    /// Gradients of row `y`. The last pixel inside the image is also used for those after it.
+    /// Gradients of row `y`. The last pixel inside the image is repeated for the pixels after it.
     #[inline(always)]
     fn take_gradients(&mut self, image: &Planes, y: usize, cols: usize) {
         let before = self.cell_px.div_ceil(2);

@@ -22,7 +22,7 @@ impl ScoreBuffer {
         if self.data.len() < room {
             self.data.resize(room, 0.0);
         }
-        // An interpreter may not know the alignment of memory, but the values do not depend on it.
+        // An interpreter such as Miri may not know the alignment of memory, but the values do not depend on the alignment.
         let start = self.data.as_ptr().align_offset(LINE);
         self.start = start.min(room - len);
         same

@@ -1,5 +1,4 @@
-//! Each lane is a cell of the parent and evaluates its candidates in the order of their
-//! offsets.
+//! Each lane of a register is a cell of the parent, and evaluates the candidates of this cell in the order of their offsets.
 
 use std::hint::black_box;
 
@@ -95,8 +94,8 @@ impl MessageWorkspace {
     }
 }
 
-/// Length of a row between the passes. A run tries all offsets at which any of its cells has a
-/// candidate, so its other cells read at most one run beyond the ends of the row.
+/// Length of a row between the passes. A run of cells tries all offsets at which any of its cells has a candidate. Other cells of the run
+/// therefore read beyond the ends of the row, by at most the length of a run.
 fn middle_stride(grid: Grid) -> usize {
     grid.stride() + 2 * ROW_ALIGN
 }

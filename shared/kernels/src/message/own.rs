@@ -11,9 +11,9 @@ use crate::simd::{Kernel, Simd};
 /// term) + constant`.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnScores<'a> {
-    /// Response of the filter, `rows x cols`.
+    /// Responses of the filter, `rows x cols`.
     pub map: &'a [f32],
-    /// Term added cell by cell, `rows x cols`.
+    /// Terms added to the cells, `rows x cols`.
     pub term: Option<&'a [f32]>,
     /// Constant added to every cell.
     pub constant: Option<f32>,
@@ -121,7 +121,7 @@ impl<S: Simd> Sum<'_, S> {
     }
 }
 
-/// Loads scores. Only the first `n` count; there may be no more.
+/// Loads scores. Only the first `n` lanes are used; there may be fewer scores than lanes.
 #[inline(always)]
 fn load<S: Simd>(simd: S, from: &[f32], at: usize, n: usize) -> S::V {
     if at + S::LANES <= from.len() {

@@ -21,9 +21,8 @@ impl ScoreRange {
 
     /// The maximum difference between two scores, with a small excess.
     ///
-    /// The excess, 1e-5 of the scores themselves, is larger than the effect of rounding to single
-    /// precision on a difference. The result is infinite if some scores are minus infinity, and NaN if all are. In
-    /// both cases, the whole plane is searched.
+    /// The excess is 1e-5 of the size of the scores, which is more than rounding to single precision can change a difference. The result is
+    /// infinite if some scores are minus infinity, and NaN if all are. In both cases, the whole plane is searched.
     #[inline(always)]
     pub(crate) fn spread(self) -> f32 {
         (self.max - self.min) + 1e-5 * (self.max.abs() + self.min.abs())

@@ -17,11 +17,9 @@ pub struct TracedChild {
 }
 
 impl MessageRule {
-    /// The child from which the message entry at one cell of the parent came.
-    ///
-    /// This evaluates the same expressions as [`add_message`](Self::add_message), so `score` is the added value, bit for bit. Ties go to
-    /// the first choice, then to the first column, then to the first row, as in the reference programs. Returns `None` if every child is
-    /// impossible.
+    /// Returns the child from which the message entry at one cell of the parent came. This evaluates the same expressions as
+    /// [`add_message`](Self::add_message), so `score` is the added value, bit for bit. Ties go to the first choice, then to the first
+    /// column, then to the first row, as in the reference programs. Returns `None` if every child is impossible.
     ///
     /// * `child`: as for [`add_message`](Self::add_message).
     /// * `at`: `[row, column]` of the parent.

@@ -61,7 +61,7 @@ fn sum_down<'a>(row: impl Fn(isize) -> &'a [f64], border: Border, out: &mut [f64
 fn sum_along(line: &[f64], out: &mut [f64]) {
     let (n_in, n_out) = (line.len(), out.len());
     out[0] = first(line[0], line[1], line[2]);
-    // Output `x` begins two samples before input sample `2 x`.
+    // The weights of output `x` begin two samples before input sample `2 x`.
     let (pairs, _) = line.as_chunks::<2>();
     let middle = pairs.iter().zip(&pairs[1..]).zip(&pairs[2..]);
     for (out, (([a, b], [c, d]), [e, _])) in out[1..].iter_mut().zip(middle) {

@@ -11,8 +11,8 @@ struct Taps {
 
 /// Taps of an area average from `from` to `to` samples.
 ///
-/// Output `d` covers the input interval `[d inv, (d + 1) inv)`, where `inv = from / to`. Partly covered
-/// samples count with their share; shares up to 1e-3 are dropped.
+/// Output `d` covers the input interval `[d inv, (d + 1) inv)`, where `inv = from / to`. A partly covered sample has its covered share as
+/// weight; shares up to 1e-3 are dropped.
 fn area_taps(from: usize, to: usize) -> Vec<Taps> {
     let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
     let taps_of = |d: usize| {

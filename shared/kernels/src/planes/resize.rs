@@ -107,7 +107,7 @@ impl Body for Resize<'_> {
     }
 }
 
-/// Weighted sums down the columns of some rows, which are `stride` apart and begin with `rows`.
+/// Weighted sums down the columns of some rows. `rows` begins with the first row, and rows are `stride` apart.
 #[inline(always)]
 fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     let n = out.len();
@@ -140,7 +140,7 @@ fn sum_down(rows: &[u8], stride: usize, weights: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Weighted sums along one interleaved row of column sums. Each lane is a colour of a pixel.
+/// Weighted sums along one row of column sums, in which the colours of each pixel are interleaved. Each lane is a colour.
 #[inline(always)]
 fn sum_along<const N: usize>(line: &[f64], along: &Taps, out: &mut [[f64; 4]]) {
     let (weights, _) = along.weights.as_chunks::<N>();

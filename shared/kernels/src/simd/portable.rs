@@ -97,7 +97,7 @@ impl Simd for Portable {
     }
 }
 
-/// Copies as much of a register of eight or four values as fits, without a function call for odd lengths.
+/// Copies as many values of a register of four or eight as fit. Lengths other than a whole register need no function call.
 #[inline(always)]
 pub(super) fn copy_partial(value: &[f32], to: &mut [f32]) {
     if to.len() >= value.len() {

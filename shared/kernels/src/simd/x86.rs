@@ -248,7 +248,7 @@ impl Simd for Avx512 {
     }
 }
 
-/// Transposes the 4 x 4 squares in each quarter or half register, then the squares themselves.
+/// Transposes each square of 4 x 4 values within the registers, then the arrangement of the squares.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn transpose8(rows: &[__m256; 8]) -> [__m256; 8] {
