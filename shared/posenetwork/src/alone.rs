@@ -1,19 +1,20 @@
-//! Measures of one person from the peaks of the joint maps: mean heat, position, and which way up the person is.
+//! Measures of one person from the peaks of the joint maps: mean heat, position, and the direction of the head.
 
 use crate::maps::{JointMaps, MapSettings};
 use crate::network::Turn;
 use crate::outline::outline_of;
 
-/// Minimum heat, 0 to 1, of a joint that counts for the box around the person.
+/// Minimum heat, 0 to 1, at which a joint is used for the box around the person.
 const FAINT: f64 = 0.02;
 
-/// Minimum heat, 0 to 1, of a joint that counts for the direction of the head.
+/// Minimum heat, 0 to 1, at which a joint is used for the direction of the head.
 const SURE: f64 = 0.2;
-/// Minimum number of leg joints needed, and minimum distance from them to the head, as a share of the longer side of the window.
+/// Minimum number of leg joints for a direction, and minimum distance between these joints and the head, as a share of the longer side of
+/// the window.
 const LEGS: usize = 3;
 const LONG: f64 = 0.12;
-/// Largest angle, in radians, between the head's direction and upright before the picture is rotated: 70 degrees. For a person whose trunk
-/// is bent to the horizontal over upright legs, this angle is 63 degrees.
+/// The picture is rotated if the angle between the direction of the head and upright is larger than this: 70 degrees, in radians. For a
+/// person whose trunk is bent to the horizontal over upright legs, this angle is 63 degrees.
 const MOST_LEAN: f64 = 7.0 / 18.0 * core::f64::consts::PI;
 
 impl JointMaps {
@@ -24,8 +25,8 @@ impl JointMaps {
         sum / self.peaks().len().max(1) as f64
     }
 
-    /// Returns how to rotate the picture so that the network sees this person upright. The direction points from the legs to the neck and
-    /// head. It changes less than the direction of the trunk when a person bends down.
+    /// Returns the rotation of the picture with which the network sees this person upright. The direction points from the legs to the neck
+    /// and head. It changes less than the direction of the trunk when a person bends down.
     ///
     /// * `now`: rotation used so far; it is kept if the direction differs by at most 70 degrees.
     pub fn turn(&self, now: Turn) -> Turn {
@@ -49,7 +50,8 @@ impl JointMaps {
         now.towards(towards, MOST_LEAN)
     }
 
-    /// Sum of the evidence of all joints at their peaks. A joint without a peak counts as the floor value.
+    /// Sum of the evidence of all joints at their peaks. A joint without a peak counts with the floor value, the evidence where the network
+    /// sees nothing.
     pub fn score(&self, settings: &MapSettings) -> f32 {
         let floor = self.floor();
         let peaks = self.peaks().iter();

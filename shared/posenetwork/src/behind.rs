@@ -1,20 +1,20 @@
-//! Bars over the body parts of a known person: they are painted over so that a network sees the person behind.
+//! Bars that cover the body parts of a known person. They are painted over the picture, so that a network sees the person behind.
 
 use skeleton::PARSE14;
 
 use crate::cover::Bar;
 use crate::maps::JointMaps;
 
-/// Minimum heat, 0 to 1, of a joint at the end of a part that is painted over.
+/// Minimum heat, 0 to 1, of both end joints of a part that is painted over.
 const SURE: f64 = 0.2;
 /// Half the width of a limb, as a share of the longer side of the box around the person.
 const HALF_WIDTH: f64 = 0.0375;
-/// Half the width of the head, as a share of the longer side of the box around the person. The head reaches from the neck to the top of the
-/// head.
+/// Half the width of the head, as a share of the longer side of the box around the person. The bar of the head reaches from the neck to the
+/// top of the head.
 const HALF_HEAD: f64 = 0.06;
 /// The edges and diagonals of the trunk. Hips and shoulders are given by their indices in [`PARSE14`].
 const TRUNK: [(usize, usize); 6] = [(2, 8), (3, 9), (8, 9), (2, 3), (2, 9), (3, 8)];
-/// The neck and the top of the head.
+/// Indices of the neck and the top of the head.
 const HEAD: (usize, usize) = (12, 13);
 
 impl JointMaps {

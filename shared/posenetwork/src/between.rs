@@ -19,8 +19,8 @@ impl Tap {
                 is_inside,
             };
         }
-        // The cell at or before the position. This computes `floor` of a number of at least -1 without needing a processor instruction for
-        // it.
+        // The cell at or before the position. This computes `floor` for numbers of at least -1, also on processors without an instruction
+        // for it.
         let lower = (cell + 1.0) as i64 - 1;
         let first = lower - 1;
         Self {

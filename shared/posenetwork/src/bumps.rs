@@ -1,4 +1,4 @@
-//! The maps of a view as a few Gaussians: joints with their uncertainty, instead of all cells.
+//! Description of a view's joint maps by a few Gaussians (joints with their uncertainty) instead of all cells.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -6,9 +6,9 @@ use crate::MapSettings;
 use crate::maps::N_JOINTS;
 use crate::person_maps::PersonMaps;
 
-/// Minimum heat for which another Gaussian is fitted; lower residuals are ignored.
+/// Minimum residual heat to which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
-/// Height below which a Gaussian is not reduced, even if its neighbours take over its heat.
+/// Minimum height of a Gaussian. Its height is not reduced further, even if its neighbours describe all of its heat.
 const LEAST_HEIGHT: f64 = 0.002;
 /// Number of times that all heights are fitted again after a Gaussian is added.
 const SWEEPS: usize = 6;
@@ -16,7 +16,7 @@ const SWEEPS: usize = 6;
 pub const MOST_OF_A_JOINT: usize = 8;
 /// Number of cells on each side of a maximum to which a Gaussian is fitted.
 const REACH: i64 = 2;
-/// Minimum value of a cell to which a Gaussian is fitted, as a share of the maximum.
+/// A Gaussian is fitted to the cells whose value is at least this share of the maximum.
 const SHARE: f64 = 0.5;
 /// Smallest and largest standard deviation along any axis, in cells.
 const SIGMAS: [f64; 2] = [0.4, 12.0];
@@ -87,7 +87,7 @@ fn precisions() -> [f64; 2] {
     [1.0 / (wide * wide), 1.0 / (narrow * narrow)]
 }
 
-/// Describes the maps of all joints as sums of Gaussians. The highest Gaussian is fitted first, and each later one is fitted to the
+/// Describes the maps of all joints as sums of Gaussians. The highest Gaussian is fitted first, and each further Gaussian is fitted to the
 /// residual of the earlier ones.
 pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
     let size = maps.grid().size;
@@ -150,8 +150,8 @@ fn for_each_cell(bump: &Bump, size: [usize; 2], mut cell: impl FnMut(usize, f64)
     }
 }
 
-/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. In this way, neighbours share the heat
-/// between them.
+/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. In this way, heat between neighbouring
+/// Gaussians is divided between them.
 ///
 /// * `left`: residual of the map.
 fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {
@@ -185,7 +185,7 @@ fn highest(joint: usize, heats: &[f64], [columns, rows]: [usize; 2]) -> Option<B
         is_inside.then(|| heats[at[1] as usize * columns + at[0] as usize])
     };
     let fitted = fit(&around, *top);
-    // If no Gaussian can be fitted, one as wide as a cell removes the maximum.
+    // If no Gaussian can be fitted, a Gaussian as wide as a cell describes the maximum.
     let (away, heat, precision) = fitted.unwrap_or(([0.0; 2], *top, [1.0, 0.0, 1.0]));
     Some(Bump {
         joint,

@@ -1,4 +1,4 @@
-//! Runs of the network on boxes that may not fit: on several boxes, then on a closer box around the person.
+//! Runs the network on boxes that may not fit the person: on several boxes, then on a closer box around the person that was found.
 
 use kernels::Rgb8View;
 
@@ -8,9 +8,9 @@ use crate::outline::overlap;
 
 /// Largest overlap of two boxes for which a second run is worthwhile. Boxes that overlap more show the network nearly the same picture.
 const FITS: f64 = 0.8;
-/// Largest loss of mean joint heat, 0 to 1, that is accepted for a box that fits better.
+/// Largest decrease of the mean heat of the joints, 0 to 1, that is accepted for a box that fits better.
 const FAINTER: f64 = 0.1;
-/// Maximum number of further runs for one person after the first.
+/// Maximum number of further runs for one person, after the first run.
 const MOST_MORE: usize = 2;
 
 /// Network and settings for finding the joints of people in a picture.
@@ -26,7 +26,7 @@ pub struct Looker<'a> {
 #[derive(Debug, Default)]
 pub struct LookMemory {
     workspace: Workspace,
-    /// Maps of a box that may fit better than the current one.
+    /// Maps for a box that may fit better than the current box.
     other: JointMaps,
 }
 
@@ -89,7 +89,7 @@ impl Looker<'_> {
         Ok(Some(self.judge((outline, turn, sight.front()), maps)))
     }
 
-    /// Rates the result for a box whose maps have been read.
+    /// Returns the result for a box whose maps have been read.
     ///
     /// * `turn`: rotation of the picture.
     /// * `front`: direction in which the trunk faces, according to the network.
@@ -109,8 +109,8 @@ impl Looker<'_> {
     }
 
     /// Runs the network again on the box around the joints found in the previous box. This repeats as long as the box changes and shows the
-    /// person about as well or better. A box in which the person is small or at the edge is thus replaced by one that fits. A box that
-    /// cuts off the feet is kept, because the network places the feet at its edge.
+    /// person about as well or better. A box in which the person is small or near the edge is thus replaced by a box that fits. A box that
+    /// cuts off the feet is not replaced, because the network then finds the feet at the edge of the box.
     ///
     /// * `seen`, `maps`: result for the first box; the maps are replaced by better ones.
     ///

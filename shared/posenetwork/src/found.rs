@@ -1,4 +1,4 @@
-//! Joints from the values of a network's output: weighted sums of keypoints, with scores.
+//! Joints computed from the output of a network: weighted sums of keypoints, with scores.
 
 use keypoints::{Codec, Keypoint, Score};
 
@@ -26,7 +26,7 @@ pub(crate) fn scored(
     }
 }
 
-/// Value for a row without keypoints.
+/// Value used where there is no keypoint.
 pub(crate) const NOWHERE: Keypoint = Keypoint {
     at: [0.0; 2],
     score: 0.0,
@@ -49,7 +49,7 @@ pub(crate) fn weighted(
     Some(sum)
 }
 
-/// The likelihood along an axis relative to the peak of a label of the published width, at most 1.
+/// The highest likelihood along an axis, as a fraction of the peak of a training label with the published width; at most 1.
 pub(crate) fn likelihood(values: &[f32], axis: usize, sight: &Sight<'_>) -> Vec<f64> {
     let nats = match sight.network().card().output {
         Codec::Simcc { nats, .. } => nats,

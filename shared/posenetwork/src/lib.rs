@@ -1,4 +1,4 @@
-//! Networks that find people in pictures, and their keypoints as the evidence of a view.
+//! Networks that find people and their keypoints in pictures. The results are the evidence of a view.
 //!
 //! [`PoseNetwork`] is a network with its card: it takes a picture and a box around a person, and returns a [`Sight`]. [`JointMaps`] are the
 //! logarithms of its maps for the 14 joints of the skeleton. [`PersonMaps`] are the same maps with their position in the picture.

@@ -18,9 +18,9 @@ pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 pub struct MapSettings {
     /// Factor of the logarithm.
     pub lambda: f64,
-    /// Heat assumed where the network sees nothing. This floor keeps one view from ruling out what other views see.
+    /// Heat assumed where the network sees nothing. Because of this floor, one view cannot rule out a joint that other views see.
     pub eps: f64,
-    /// Standard deviation of a keypoint without a map, as a share of the height of the input.
+    /// Standard deviation of the position of a keypoint without a map, as a share of the height of the input.
     pub point_sigma: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct JointMaps {
     told: Vec<Option<f64>>,
     /// The expected error of each keypoint.
     errors: Vec<f64>,
-    /// Standard deviation of a keypoint with score 1 on the maps themselves; `None` if it follows from the heat.
+    /// Standard deviation of a keypoint with score 1 on the maps themselves; `None` if it is computed from the heat.
     sigma_px: Option<f64>,
 }
 
@@ -96,13 +96,13 @@ fn coarseness([rows, columns]: [usize; 2]) -> usize {
     (1..=most).find(|every| area(every) <= MOST_CELLS).unwrap_or(most)
 }
 
-/// Pixels between two columns or rows of a grid that is made for a codec without maps.
+/// Pixels between neighbouring columns or rows of a grid, for a network or program that gives keypoints without maps.
 const GRID_PX: f64 = 2.0;
 /// Factor by which the box around another program's keypoints is enlarged for the grid.
 const BOX_MARGIN: f64 = 1.25;
-/// Maximum number of rows of such a grid.
+/// Maximum number of rows of a grid for keypoints without maps.
 const MOST_ROWS: usize = 64;
-/// Minimum standard deviation on such a grid, in cells. A narrower Gaussian could be lost between two cells.
+/// Minimum standard deviation on a grid for keypoints without maps, in cells. A narrower Gaussian could fall between two cells.
 const LEAST_SIGMA: f64 = 1.0;
 
 /// The standard deviation along one axis of a normal distribution in the plane whose mean distance is 1: sqrt(2 / pi).
@@ -113,7 +113,7 @@ impl JointMaps {
     ///
     /// # Errors
     ///
-    /// Fails with [`LookError::Output`]; this cannot happen after the network has run successfully.
+    /// Fails with [`LookError::Output`]; this cannot happen if the network has run successfully.
     pub fn read(&mut self, sight: &Sight<'_>, settings: &MapSettings) -> Result<(), LookError> {
         let keypoints = sight.keypoints()?;
         let rows = joint_rows(sight.network().names());
@@ -175,9 +175,10 @@ impl JointMaps {
     /// the floor. If no person was found, all cells are at the floor and no joint has a peak.
     ///
     /// * `keypoints`: positions in pixels of the picture; `None`, or a score of 0, for keypoints that were not found.
-    /// * `ways`: how the joints follow from the keypoints: [`joint_ways`](keypoints::joint_ways) of their names. A joint has a peak if all
-    ///   keypoints of one of its ways were found; the first such way is used.
-    /// * `settings`: its `point_sigma` is not used.
+    /// * `ways`: for each joint, the alternative sums of keypoints from which it can be computed ([`joint_ways`](keypoints::joint_ways) of
+    ///   the keypoints' names). The first alternative whose keypoints were all found gives the joint's peak; without one, the joint has no
+    ///   peak.
+    /// * `settings`: conversion of heat to evidence. The field `point_sigma` is not used.
     /// * `sigma`: standard deviation, as a share of the height of the enlarged box, like [`MapSettings::point_sigma`].
     /// * Returns true if a person was found.
     ///
@@ -343,7 +344,7 @@ impl JointMaps {
         self.evidence().map_or_else(Vec::new, |maps| maps.maxima(joint, n, |_| true))
     }
 
-    /// The evidence at positions where a view shows nothing of a joint.
+    /// The evidence for a joint at positions where the network sees nothing.
     pub fn floor(&self) -> f32 {
         self.floor
     }

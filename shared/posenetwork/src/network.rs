@@ -123,8 +123,9 @@ impl PoseNetwork {
         Ok(network)
     }
 
-    /// Runs the network with the number type of its card. If that type is refused, tries the other integer type and keeps it if it works.
-    /// Depending on how it was converted, the same network is published with bytes or with 32-bit integers.
+    /// Runs the network with the number type of its card. If the library refuses this type, the other integer type is tried, and used from
+    /// then on if it works. The same network may be published with bytes or with 32-bit integers as input, depending on its conversion to
+    /// ONNX.
     fn try_numbers(&mut self, workspace: &mut Workspace) -> Result<(), LookError> {
         let refused = match self.run(workspace) {
             Ok(()) => return Ok(()),
@@ -142,12 +143,12 @@ impl PoseNetwork {
         })
     }
 
-    /// Returns the same network, which also runs on the mirror image of every window and averages both results. The result is
-    /// more accurate but takes twice as long.
+    /// Returns the same network, changed to run also on the mirror image of every window and to average both results. The result is more
+    /// accurate but takes twice as long.
     ///
     /// # Errors
     ///
-    /// Fails with [`FitError::Mirror`]: the network returns positions, or a keypoint has no partner on the other side.
+    /// Fails with [`FitError::Mirror`] if the network returns positions, or if a keypoint has no counterpart on the other side of the body.
     pub fn mirrored(self) -> Result<Self, FitError> {
         let mirror = Mirror::new(&self.card, &self.names).map_err(FitError::Mirror)?;
         Ok(Self {
@@ -176,7 +177,7 @@ impl PoseNetwork {
         [self.card.input.width, self.card.input.height]
     }
 
-    /// Returns true if the network can process rotated pictures: it returns maps or distributions.
+    /// Returns true if the network can process rotated pictures, because it returns maps or distributions.
     pub fn may_turn(&self) -> bool {
         !matches!(self.card.output, Codec::Keypoints { .. })
     }
@@ -322,9 +323,9 @@ impl<'a> Sight<'a> {
         &self.window
     }
 
-    /// The window in which a cell's position is its index times the step of the maps, as in [`HeatMaps::step`]. It is
-    /// [`Self::window`] if the first cell is at the first pixel. It is moved by half a cell if every cell is at the
-    /// centre of the pixels that it covers.
+    /// The window in which a cell's position is its index times the step of the maps, as in [`HeatMaps::step`]. It is [`Self::window`] if
+    /// the first cell is at the first pixel. It is [`Self::window`] moved by half a cell if every cell is at the centre of the pixels that
+    /// it covers.
     ///
     /// # Errors
     ///
@@ -399,7 +400,7 @@ impl<'a> Sight<'a> {
     fn also(&self, name: Option<&str>) -> Option<&'a Tensor> {
         let name = name?;
         let names = self.network.outputs.iter().zip(self.outputs);
-        // These outputs come after the outputs of the codec.
+        // These outputs come after the outputs that contain the keypoints.
         names.rev().find(|output| output.0.as_str() == name).map(|name| name.1)
     }
 

@@ -90,7 +90,7 @@ impl<'a> PersonMaps<'a> {
     }
 
     /// The evidence for a joint at a point of the picture, in pixels. It is interpolated between sixteen cells (Catmull & Rom 1974), so
-    /// that a maximum may be between two cells. Outside the maps, it is the floor.
+    /// that a maximum may be between two cells. Outside the maps, the evidence is the floor.
     pub fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
         let [x, y] = self.grid.cell(point);
         let [columns, rows] = self.grid.size;
@@ -105,7 +105,7 @@ impl<'a> PersonMaps<'a> {
     /// position is the vertex of parabolas through the cell and its neighbours, because the logarithm of a Gaussian is a parabola.
     ///
     /// * `n`: maximum number of maxima.
-    /// * `is_wanted`: returns true for positions that count, in pixels of the picture.
+    /// * `is_wanted`: returns true for positions of maxima that should be included, in pixels of the picture.
     pub fn maxima(
         &self,
         joint: usize,

@@ -1,4 +1,4 @@
-//! Tests of maps as Gaussians.
+//! Tests of the description of maps by Gaussians.
 
 use super::*;
 use crate::person_maps::MapGrid;
@@ -88,7 +88,7 @@ fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
         bump(4, [25.0, 40.0], 0.5, [2.0, 2.0], 0.0),
         bump(4, [55.0, 70.0], 0.4, [2.0, 2.0], 0.0),
     ];
-    // The joint may be anywhere along a limb.
+    // Several Gaussians in a row describe a joint that may be anywhere along a limb.
     given.extend((0..6).map(|i| {
         bump(
             8,

@@ -1,10 +1,10 @@
-//! Left and right of the maps: exchanged, or assigned from what one view shows.
+//! Left and right of the maps: swapping them, or assigning them from a single view.
 
 use super::JointMaps;
 use crate::network::PoseNetwork;
 
 impl JointMaps {
-    /// Exchanges the left and right joints as named by the network; [`Self::keypoint`] does not change.
+    /// Swaps the left and right joints as named by the network; [`Self::keypoint`] does not change.
     pub fn exchange_sides(&mut self) {
         let area = self.rows * self.columns;
         for [right, left] in skeleton::SIDES {
@@ -19,7 +19,7 @@ impl JointMaps {
     }
 
     /// Renames left and right from sides of the picture to sides of the person, using the trunk's direction from the network. They are
-    /// exchanged for a person seen from behind. Several views give more information (`multiview`).
+    /// swapped for a person seen from behind. With several views, `multiview` makes a more reliable decision.
     ///
     /// * `network`: the network that produced the maps.
     /// * `front`: direction in which the trunk faces ([`Sight::front`](crate::Sight::front)).

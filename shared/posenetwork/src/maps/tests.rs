@@ -94,7 +94,7 @@ fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
         let maps = maps(&keypoints);
         assert_eq!(maps.peaks()[NECK], None);
         assert_eq!(maps.maxima(NECK, 3), []);
-        // The head follows from the neck; the left hip does not.
+        // The head is not known without the neck; the left hip does not depend on it.
         assert_eq!(maps.peaks()[13], None);
         assert!(maps.peaks()[3].is_some());
     }

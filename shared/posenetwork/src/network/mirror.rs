@@ -1,13 +1,13 @@
-//! Running the network on the mirror image of a window as well as on the window.
+//! Runs of a network on the mirror image of a window, in addition to the window itself.
 
 use keypoints::{Card, Codec, Layout, mirrored};
 
 use super::{PoseNetwork, Tensor};
 
-/// Mapping of the output for a mirror image to the output for the picture.
+/// Conversion of the output for a mirror image to the output for the picture.
 #[derive(Debug)]
 pub(super) struct Mirror {
-    /// For each keypoint of the mirror image, the index of the keypoint of the picture.
+    /// For each keypoint of the mirror image, the index of the corresponding keypoint of the picture.
     partner: Vec<usize>,
 }
 
@@ -91,8 +91,8 @@ impl Mirror {
         }
     }
 
-    /// * `is_symmetric`: true if the cells of a mirror image coincide with cells of the picture. Otherwise each cell is at the first of its
-    ///   pixels, and the mirror image is moved by one cell. The remaining offset is less than half a cell.
+    /// * `is_symmetric`: true if the cells of a mirror image coincide with cells of the picture. If false, each cell is at the first of the
+    ///   pixels that it covers, and the maps of the mirror image are moved by one cell. The remaining offset is less than half a cell.
     fn blend_maps(
         &self,
         to: &mut Tensor,

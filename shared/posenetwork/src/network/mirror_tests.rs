@@ -1,4 +1,4 @@
-//! Tests of networks that also process mirror images: a symmetric picture gives the same result as without mirror images.
+//! Tests of networks that also process mirror images: for a symmetric picture, the result with mirror images is the same as without.
 
 use inference::onnx::{Attribute, Network};
 

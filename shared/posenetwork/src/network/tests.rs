@@ -165,7 +165,8 @@ fn whole_numbers_as_output_are_refused() {
     assert_eq!(refused(&net, CARD), "the output `maps` is not of type f32");
 }
 
-/// Makes a network that returns distributions over columns and rows, from the brightest pixel of each; and its card.
+/// Makes a network that returns distributions over columns and rows, computed from the brightest pixel of each column and row. Also returns
+/// the network's card.
 pub(super) fn distributions() -> (Network, String) {
     let mut net = network("Relu");
     net.nodes.clear();
@@ -283,6 +284,6 @@ fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
         let network = fitted(numbers).unwrap();
         assert_eq!(network.card().input.numbers, Numbers::U8);
     }
-    // Input prepared for single precision would not fit this type.
+    // Input values that were prepared for single precision would not fit this type.
     fitted("f32").unwrap_err();
 }

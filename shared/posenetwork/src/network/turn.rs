@@ -1,4 +1,4 @@
-//! Rotation of pictures by quarter turns, so that people who lie or do a handstand are upright in the network's input.
+//! Rotation of pictures by quarter turns, so that people who lie down or do a handstand are upright in the network's input.
 
 use keypoints::{Card, Codec, Layout};
 
@@ -135,14 +135,14 @@ impl Turn {
         let mut named = network.outputs.iter().zip(outputs).rev();
         let found = named.find(|output| Some(output.0.as_str()) == front);
         if let Some(right) = found.and_then(|output| output.1.values.first_mut()) {
-            // With a sideways rotation, left and right of the input are up and down of the picture, for which the network gives no
-            // direction.
+            // If the picture is rotated sideways, left and right in the input are up and down in the picture. The network then says
+            // nothing about left and right in the picture.
             *right = if self == Self::Down { -*right } else { 0.0 };
         }
     }
 
-    /// * `is_symmetric`: true if the cells of a rotated picture coincide with cells of the picture. Otherwise each cell is at the first of
-    ///   its pixels, and the rotated maps are moved by one cell. The remaining offset is less than half a cell.
+    /// * `is_symmetric`: true if the cells of a rotated picture coincide with cells of the picture. If false, each cell is at the first of
+    ///   the pixels that it covers, and the rotated maps are moved by one cell. The remaining offset is less than half a cell.
     fn turn_maps(self, maps: &mut Tensor, (layout, is_symmetric, width): (Layout, bool, usize)) {
         let Some([channels, rows, columns]) = maps.map_sides(layout) else {
             return;
@@ -207,7 +207,7 @@ mod tests {
             (Turn::Down, [3, 4]),
             (Turn::Left, [0, 2]),
         ] {
-            // A window of 7 x 5 cells, and the middle of the side at the head.
+            // A window of 7 x 5 cells. `head` is the middle of the side at which the head is.
             let [u, v] = turn.in_input(head, [6, 4]);
             let middle = if turn.is_sideways() { 2 } else { 3 };
             assert_eq!([u, v], [middle, 0], "{turn:?}");

@@ -1,4 +1,4 @@
-//! Tests of networks with rotated pictures: a network that is independent of rotation gives the same result.
+//! Tests of networks with rotated pictures: a network that does not depend on the orientation of the picture gives the same result.
 
 use inference::onnx::Network;
 
@@ -25,7 +25,7 @@ fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
 
 #[test]
 fn whoever_does_not_care_sees_the_same_in_every_turn() {
-    // The window is 12 x 16 or 16 x 12 pixels, widened to contain the box.
+    // The window has the proportions 12 x 16 or 16 x 12, and is enlarged to contain the box.
     let upright = found(&network("Relu"), CARD, Turn::Up);
     let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
     for turn in TURNS {
