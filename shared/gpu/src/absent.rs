@@ -1,4 +1,4 @@
-//! Replacement for the GPU code in a build without the feature `gpu`. Such a build never has a device.
+//! Replacement for the GPU code in a build without the feature `gpu`. In such a build, no device can be opened.
 
 use std::sync::Arc;
 

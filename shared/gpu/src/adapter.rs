@@ -1,4 +1,4 @@
-//! Graphics cards, and programs that emulate one.
+//! Graphics cards, and programs that emulate a graphics card.
 
 use core::fmt;
 
@@ -16,7 +16,7 @@ pub struct Adapter {
 /// The kind of an adapter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
-    /// A program that computes on the processor, slower than the code that is written for the processor.
+    /// A program that emulates a graphics card on the processor. It is slower than the code written for the processor.
     Software,
     /// A device of any other kind.
     Other,

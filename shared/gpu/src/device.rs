@@ -26,7 +26,7 @@ pub struct Device {
     max_binding: u64,
     patience: Duration,
     is_lost: Arc<AtomicBool>,
-    /// The first error reported by the driver.
+    /// The first error that the driver has reported.
     complaint: Arc<Mutex<Option<String>>>,
 }
 
@@ -93,7 +93,7 @@ impl Device {
         })
     }
 
-    /// Returns the same device with a lower limit for the bytes bound at once, to emulate a smaller device.
+    /// Returns the same device with a lower limit for the size of the buffers that a kernel can access, to emulate a smaller device.
     #[must_use]
     pub fn with_max_binding(self, max_binding: u64) -> Self {
         Self {
@@ -102,7 +102,7 @@ impl Device {
         }
     }
 
-    /// Returns the same device, but passes kernels to the driver as text, with checks and bounds for every access. This emulates a device
+    /// Returns the same device, changed to pass kernels to the driver as text, with a bounds check for every access. This emulates a device
     /// that does not accept SPIR-V.
     #[must_use]
     pub fn without_spirv(self) -> Self {
@@ -135,7 +135,7 @@ impl Device {
         &self.limits
     }
 
-    /// Returns true if the device accepts kernels in SPIR-V, whose arithmetic can be decorated.
+    /// Returns true if the device accepts kernels in SPIR-V, in which arithmetic can be marked as not to be fused.
     pub(crate) fn takes_spirv(&self) -> bool {
         self.takes_spirv
     }
@@ -168,7 +168,7 @@ impl Device {
         })
     }
 
-    /// Makes a buffer that the CPU or kernels write, and that can be read.
+    /// Makes a buffer to which the CPU or kernels write, and which can be read.
     pub(crate) fn space(&self, n_bytes: u64) -> Buffer {
         self.raw.create_buffer(&wgpu::BufferDescriptor {
             label: None,

@@ -4,7 +4,7 @@ use wgpu::{BindGroup, Buffer, ComputePass, ComputePipeline};
 
 use crate::device::Device;
 
-/// Number of workgroups in a row if the first dimension alone cannot hold all of them. The kernels contain the same number.
+/// Number of workgroups along the first dimension if this dimension alone cannot hold all of them. The kernels contain the same constant.
 pub(crate) const ROW: u32 = 32768;
 
 /// A kernel, its buffers, and its number of workgroups.
@@ -18,7 +18,8 @@ pub(crate) struct Dispatch {
 impl Dispatch {
     /// Binds buffers to a kernel, in the order of the kernel's bindings.
     ///
-    /// * `groups`: number of workgroups in both dimensions. If the first is too large and the second is 1, the groups are split into rows.
+    /// * `groups`: number of workgroups in both dimensions. If the first number is too large and the second is 1, the groups are divided
+    ///   into rows.
     pub(crate) fn new(
         device: &Device,
         pipeline: &ComputePipeline,
@@ -50,7 +51,7 @@ impl Dispatch {
         self.record_some(pass, self.groups[0]);
     }
 
-    /// Records the first `n` workgroups of the kernel.
+    /// Records the kernel with only its first `n` workgroups.
     pub(crate) fn record_some(&self, pass: &mut ComputePass<'_>, n: u32) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.buffers, &[]);

@@ -2,7 +2,7 @@
 
 /// Expands every `@unroll NAME FIRST END STEP { body }` to one body for each value, with `$NAME` replaced.
 ///
-/// All texts are part of this crate. A malformed loop is not changed, and the WGSL parser refuses it.
+/// A malformed loop is not changed, and the WGSL parser then reports it; but all texts are part of this crate.
 pub(crate) fn expand(text: &str) -> String {
     let mut out = String::with_capacity(4 * text.len());
     let mut rest = text;

@@ -1,4 +1,4 @@
-//! A group of pyramid levels, as many as the device can access at once: their responses, messages, roots and traces.
+//! A group of as many pyramid levels as the device can access at once, with the computation of their responses, messages, roots and traces.
 
 use std::ops::Range;
 
@@ -11,14 +11,15 @@ use crate::dispatch::{Dispatch, ROW};
 use crate::programs::{Kernel, Programs};
 use crate::tree::{PANEL, Tree};
 
-/// Number of cells in a workgroup of `responses`, `combine` and `roots`, and side of a tile of `transform`.
+/// Number of cells in a workgroup of the kernels `responses`, `combine` and `roots`. The last constant is the side of a tile of the kernel
+/// `transform`.
 const RESPONSES: usize = 64;
 const COMBINE: usize = 512;
 const ROOTS: usize = 128;
 const TILE: usize = 32;
-/// Number of roots that are traced at once.
+/// Number of roots whose trees are traced at once.
 pub(crate) const BATCH: usize = 64;
-/// Number of values in a range: the maximum, the inverted minimum, and the maximum of the part's own score.
+/// Number of values in a range: the maximum score, the inverted minimum score, and the maximum of the part's own score.
 const RANGE: usize = 3;
 
 /// A level, in the layout that the kernels expect.
@@ -57,7 +58,7 @@ pub(crate) struct Memory {
     level_of_cell: Buffer,
     /// Responses, `[level][plane][row][col]`.
     pub(crate) maps: Buffer,
-    /// Transforms, followed by scores in the same order.
+    /// Transformed scores, followed by the scores themselves in the same order.
     moved: Buffer,
     scores: Buffer,
     /// Ranges, `[level][plane][range]`.
@@ -123,7 +124,7 @@ pub(crate) fn split(device: &Device, layout: &Layout) -> Result<Vec<Range<usize>
     Ok(groups)
 }
 
-/// Parameters of a new group.
+/// Arguments from which a group is made.
 pub(crate) struct Parts<'a> {
     pub(crate) device: &'a Device,
     pub(crate) programs: &'a Programs,
@@ -272,7 +273,7 @@ impl Parts<'_> {
         all
     }
 
-    /// Makes the kernel that follows trees from their roots.
+    /// Makes the kernel that traces trees from their roots.
     fn trace(&self, memory: &Memory) -> Dispatch {
         let Memory {
             levels,
@@ -309,7 +310,7 @@ impl Parts<'_> {
 }
 
 impl Group {
-    /// Prepares the kernels for some levels.
+    /// Prepares the kernels for a range of levels.
     pub(crate) fn new(parts: &Parts<'_>, range: Range<usize>) -> Self {
         let tables = Tables::new(parts.layout, range.clone());
         let memory = Memory::new(parts, &tables);

@@ -2,8 +2,8 @@
 //!
 //! [`Device::open`] opens a GPU through Vulkan. A [`View`] searches the frames of one view on the GPU. The CPU ([`fmp::Extractor`] and
 //! [`fmp::Solver`]) is the reference. The features are identical bit for bit. If the responses are equal, the poses, scores and bounds are
-//! identical too. Responses are plain sums of fused products, as in [`fmp::Extractor::direct`]. Without the feature `gpu` there is never a
-//! device.
+//! identical too. Responses are computed as plain sums with fused multiply-adds, as in [`fmp::Extractor::direct`]. Without the feature
+//! `gpu` there is never a device.
 #![deny(unsafe_code)]
 
 mod adapter;
@@ -59,7 +59,7 @@ pub struct Found {
     pub bounds: fmp::Bounds,
 }
 
-/// Limits for the poses of a result.
+/// Limits for the poses in a result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Maximum number of poses.

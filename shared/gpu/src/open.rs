@@ -6,7 +6,7 @@ use wgpu::{Backends, DeviceType, Features, Limits};
 
 use crate::{Adapter, Choice, Kind, OpenError};
 
-/// Optional features, used if the adapter has them.
+/// Optional features of an adapter, used if available.
 const WANTED: Features = Features::SHADER_F64.union(Features::PASSTHROUGH_SHADERS);
 
 /// An opened adapter.
@@ -89,7 +89,7 @@ fn kind(of: DeviceType) -> Kind {
     }
 }
 
-/// Waits for a future of `wgpu` that is ready at once.
+/// Returns the result of a future of `wgpu` that is ready immediately.
 fn wait<F: Future>(future: F) -> F::Output {
     let mut future = std::pin::pin!(future);
     let mut context = Context::from_waker(Waker::noop());

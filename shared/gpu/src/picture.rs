@@ -1,4 +1,4 @@
-//! The features of an image: tables of its pictures, and the kernels from image to features.
+//! The features of an image: tables of the shrunken pictures, and the kernels that compute features from the image.
 
 use fmp::{Layout, Model};
 use wgpu::Buffer;
@@ -12,7 +12,7 @@ use crate::{Unsuitable, suits};
 const BLOCK: usize = 128;
 /// Number of cells in a workgroup of the histograms.
 const HISTOGRAM_BLOCK: usize = 42;
-/// Maximum number of samples along an axis that make up a shrunken pixel.
+/// Maximum number of samples along an axis that are averaged for a pixel of a shrunken picture.
 const TAPS: usize = 4;
 /// Number of orientations in a histogram.
 const ORIENTATIONS: u64 = 18;
@@ -43,9 +43,9 @@ struct Picture {
 #[derive(Debug, Default)]
 struct Tables {
     pictures: Vec<Picture>,
-    /// First sample of every shrunken row or column.
+    /// First sample for every row or column of a shrunken picture.
     first: Vec<u32>,
-    /// [`TAPS`] weights for every shrunken row or column.
+    /// [`TAPS`] weights for every row or column of a shrunken picture.
     weights: Vec<f64>,
     /// Blocks of pixels in the pictures of each octave.
     octaves: Vec<Vec<[u32; 2]>>,
@@ -57,7 +57,7 @@ struct Tables {
     n_features: usize,
 }
 
-/// Kernels and buffers from an image to the features of all levels.
+/// Kernels and buffers that compute the features of all levels from an image.
 #[derive(Debug)]
 pub(crate) struct Features {
     pub(crate) image: Buffer,
@@ -139,8 +139,8 @@ impl Tables {
         tables
     }
 
-    /// Adds the samples that every shrunken pixel covers along an axis, with the weights of `kernels::resize_part`. Returns the index of
-    /// the first entry, and the number of samples per pixel.
+    /// Adds the samples that every pixel of a shrunken picture covers along an axis, with the weights of `kernels::resize_part`. Returns
+    /// the index of the first entry, and the number of samples per pixel.
     fn cover(&mut self, from: usize, to: usize) -> (u32, u32) {
         let (scale, inverse) = (to as f64 / from as f64, from as f64 / to as f64);
         let n = (inverse.ceil() as usize + 1).min(from);
@@ -245,7 +245,7 @@ impl Tables {
     }
 }
 
-/// Weights that divide a pixel between four cells, for the four corners of the block, `[row][col][corner]`.
+/// Weights by which a pixel of a block is divided between the four cells at the corners of the block, `[row][col][corner]`.
 fn shares() -> Vec<f32> {
     let share = |pixel: usize| {
         let at = ((2 + pixel) as f64 + 0.5) / 4.0 - 0.5;

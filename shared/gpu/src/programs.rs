@@ -125,7 +125,7 @@ fn filled(text: &str, sizes: Sizes) -> String {
     })
 }
 
-/// Compiles a text; its arithmetic is decorated if the device accepts SPIR-V.
+/// Compiles a text. If the device accepts SPIR-V, all arithmetic is marked as not to be fused.
 #[expect(unsafe_code, reason = "wgpu passes SPIR-V to the driver unchanged")]
 fn module(device: &Device, text: &str, kernels: &[Entry]) -> Result<ShaderModule, Unsuitable> {
     if !device.takes_spirv() {

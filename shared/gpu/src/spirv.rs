@@ -1,4 +1,4 @@
-//! Translation of WGSL to SPIR-V in which no sum and product are fused into one operation.
+//! Translation of WGSL to SPIR-V in which the driver must not fuse a product and a sum into one operation.
 
 use naga::back::spv;
 use naga::proc::BoundsCheckPolicies;
@@ -6,14 +6,14 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 /// Index of the first word of the instructions, after the header.
 const BEGIN: usize = 5;
-/// Instructions that declare types and constants: decorations come before them.
+/// Opcodes of instructions that declare types and constants. Decorations must come before these.
 const TYPES: std::ops::RangeInclusive<u32> = 19..=39;
 /// Opcodes of sum, difference and product of numbers, and of the product of a vector and a number.
 const ARITHMETIC: [u32; 4] = [129, 131, 133, 142];
 /// `OpDecorate`, with its length of three words, and `NoContraction`.
 const NO_CONTRACTION: [u32; 2] = [0x3_0047, 42];
 
-/// Translates a kernel and decorates every sum, difference and product.
+/// Translates a kernel, and marks every sum, difference and product as not to be fused.
 ///
 /// # Errors
 ///
@@ -36,7 +36,7 @@ pub(crate) fn from_wgsl(text: &str) -> Result<Vec<u32>, String> {
     Ok(decorate(&words))
 }
 
-/// Decorates the arithmetic of a module.
+/// Marks the arithmetic of a module as not to be fused.
 fn decorate(words: &[u32]) -> Vec<u32> {
     let (mut at, mut types, mut results) = (BEGIN, words.len(), Vec::new());
     while at < words.len() {

@@ -1,4 +1,4 @@
-//! Checks whether the kernels support a model and a device. If they do not, the CPU does the search.
+//! Checks whether the kernels support a model and a device. If they do not support them, the search runs on the CPU.
 
 use fmp::{Edge, Layout, Model, Spring, Springs};
 
@@ -6,14 +6,14 @@ use crate::Unsuitable;
 use crate::device::Device;
 use crate::programs::MAX_BUFFERS;
 
-/// Maximum number of types for which a root can be packed.
+/// Maximum number of types per part with which a root can be packed.
 const MAX_TYPES: usize = 8;
 /// Side of a cell, in pixels.
 const CELL_PX: usize = 4;
 /// Shared memory of the largest kernel, in bytes.
 const SHARED: u32 = 16 * 1024;
 
-/// The shape shared by all parts of a model.
+/// The shape that all parts of a model have in common.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Shape {
     pub(crate) n_types: usize,

@@ -7,7 +7,7 @@ use crate::suits::{self, Child};
 
 /// Number of filters that a workgroup of `responses` computes.
 pub(crate) const PANEL: usize = 160;
-/// Used instead of minus infinity.
+/// Value used instead of minus infinity.
 const NEVER: f32 = -1.0e30;
 /// Maximum number of parts that are traced together.
 const GROUP: usize = 4;
@@ -42,7 +42,7 @@ pub(crate) struct Tree {
     pub(crate) children: Vec<u32>,
     /// Steps of the messages, from the leaves to the root.
     pub(crate) steps: Vec<Step>,
-    /// Parts of equal depth, from the root to the leaves; 0 is an empty slot.
+    /// Parts of equal depth, from the root to the leaves; 0 marks an empty slot.
     pub(crate) groups: Vec<[u32; GROUP]>,
     pub(crate) root_bias: f32,
 }
@@ -138,15 +138,15 @@ impl Tree {
                 self.groups.push(group);
             }
         }
-        // A buffer must not be empty.
+        // Buffers on the device must not be empty.
         if self.groups.is_empty() {
             self.groups.push([0; GROUP]);
         }
         self.children.push(0);
     }
 
-    /// Returns the part, its number of children, and the index of the first child. The children are in descending order, in which
-    /// `fmp::Solver` adds their messages.
+    /// Returns the part, its number of children, and the index of the first child. The children are in descending order. This is the order
+    /// in which `fmp::Solver` adds their messages.
     fn job(&mut self, part: usize) -> [u32; 4] {
         let first = self.children.len();
         let children = (1..self.n_parts).rev();

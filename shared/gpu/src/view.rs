@@ -30,7 +30,7 @@ pub struct View {
     staging: Mutex<Option<Buffer>>,
 }
 
-/// A root and its location on the device.
+/// A possible root of a pose, and its location on the device.
 #[derive(Debug, Clone, Copy)]
 struct Peak {
     root: Root,
@@ -105,7 +105,7 @@ impl View {
 
     /// Searches an image.
     ///
-    /// * `levels`: returns the levels whose evidence the given candidates need.
+    /// * `levels`: called with the candidates; returns the levels whose evidence is needed for them.
     /// * `evidence`: [`Layout::n_responses`] values. Only the values of the returned levels are written.
     ///
     /// # Errors

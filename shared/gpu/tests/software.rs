@@ -1,4 +1,5 @@
-//! Compares the kernels with the CPU, on any Vulkan adapter including software. The tests are skipped if there is no adapter.
+//! Compares the kernels with the CPU, on any Vulkan adapter, including programs that emulate one. The tests are skipped if there is no
+//! adapter.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says so")]
@@ -19,7 +20,7 @@ const WANTED: Wanted = Wanted {
     min_separation: 1.0,
 };
 
-/// The device shared by all tests, except those that lose it.
+/// The device shared by all tests, except the tests in which the device is lost.
 fn device() -> Option<Arc<Device>> {
     static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
     DEVICE.get_or_init(|| opened().map(Arc::new)).clone()
@@ -157,7 +158,7 @@ fn of_equal_responses_poses_scores_and_bounds_have_the_bits_of_the_cpu() {
         let case = Case::new(&mut rng, shape);
         let view = case.view(&device).unwrap();
         for n_values in [9, 1 << 20] {
-            // With few different values there are ties; with many there are none.
+            // If there are only a few different values, scores are often equal; with many values, they never are.
             let value = |_| rng.u32(0..n_values) as f32 / n_values as f32 * 2.0 - 1.0;
             let responses: Vec<f32> = (0..case.layout.n_responses()).map(value).collect();
             let expected = case.solved(&responses);
@@ -185,7 +186,7 @@ fn a_search_gives_evidence_and_the_poses_that_are_in_it() {
     Extractor::direct(Arc::clone(&case.model)).responses(case.image(), &case.layout, &mut expected);
     for level in 0..case.layout.levels.len() {
         for (filter_idx, filter) in case.model.spec().filters.iter().enumerate() {
-            // No feature is larger than 1. Each product and sum is rounded once, on both sides.
+            // No feature is larger than 1. Each product and sum is rounded once, both on the CPU and on the device.
             let weights: f64 = filter.weights.iter().map(|weight| weight.abs()).sum();
             let bound = 2.0 * filter.weights.len() as f64 * f64::from(f32::EPSILON) * weights;
             for at in case.layout.map_range(level, filter_idx) {

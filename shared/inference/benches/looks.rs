@@ -1,5 +1,5 @@
-//! Times one run of the built-in network, or of another file, with each library in turn: Parallax itself, `rten`, and ONNX Runtime if its
-//! library is given.
+//! Measures the time of one run of the built-in network, or of another file, with each library in turn: Parallax itself, `rten`, and ONNX
+//! Runtime if its library is given.
 //!
 //! `cargo bench -p inference --features ort --bench looks -- [--onnx-runtime libonnxruntime.so] [network.onnx]`
 #![cfg_attr(
@@ -50,7 +50,7 @@ fn main() {
     let mut times = vec![Vec::new(); sessions.len()];
     let n = sessions.len();
     for round in 0..rounds {
-        // Each library goes first equally often.
+        // Each library is the first to run equally often.
         for at in (0..n).map(|at| (at + round) % n) {
             times[at].push(time(&sessions[at].0));
         }
@@ -107,7 +107,7 @@ fn time(session: &Session) -> f64 {
     processor_time() - begin
 }
 
-/// Processor time of all threads of the process, in milliseconds. Other programs affect it less than wall-clock time.
+/// Processor time of all threads of the process, in milliseconds. Other programs affect processor time less than wall-clock time.
 fn processor_time() -> f64 {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     now.tv_sec as f64 * 1e3 + now.tv_nsec as f64 * 1e-6

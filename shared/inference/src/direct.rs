@@ -10,7 +10,7 @@ use crate::rest::rest;
 use crate::rten_engine::Rten;
 use crate::source::Source;
 
-/// A network in two parts: its front and the rest.
+/// A network split into two parts: its front, which `kernels` runs, and the rest.
 #[derive(Debug)]
 pub(crate) struct Parts {
     input: String,
@@ -20,7 +20,7 @@ pub(crate) struct Parts {
     rest: Option<Rten>,
 }
 
-/// A network in two parts, and as a whole for inputs of different shapes.
+/// A network split into two parts. It is also kept as a whole, for inputs of other shapes.
 #[derive(Debug)]
 pub(crate) struct Direct {
     pub(crate) parts: Parts,

@@ -114,7 +114,7 @@ pub struct RunError(#[source] pub(crate) EngineError);
 
 /// A network loaded by a library.
 pub(crate) trait Engine: fmt::Debug + Send + Sync {
-    /// Runs the network on one thread of the processor, and passes on the outputs with these names.
+    /// Runs the network on one thread of the processor, and passes the outputs with the given names to the caller.
     fn run(
         &self,
         inputs: &[Input<'_>],

@@ -1,6 +1,5 @@
-//! The front of a network: convolutions, sums and the operations between them, found in the file by starting at the input.
-//!
-//! Another library runs the rest. It also runs every network with an unsupported convolution.
+//! The front of a network: the convolutions, the sums and the operations between them that follow the input. Another library runs the rest
+//! of the network, and the whole of any network with an unsupported convolution.
 
 use std::collections::{HashMap, HashSet};
 
@@ -16,7 +15,7 @@ const MOST_PADDING: usize = 8;
 /// Largest side of a kernel.
 const MOST_TAPS: usize = 2 * MOST_PADDING + 1;
 
-/// Reason why a network has no front.
+/// Reason why Parallax itself cannot run the first part of a network.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoFront {
     #[error("the processor has neither AVX2 nor AVX-512")]
@@ -59,7 +58,7 @@ pub(crate) enum Operation {
         input: Value,
         residual: Option<Value>,
     },
-    /// A sum. The pixels of the second value are repeated.
+    /// A sum of two values. The pixels of the second value are repeated `repeat` times, down and across.
     Sum { of: [Value; 2], repeat: usize },
 }
 
@@ -75,7 +74,7 @@ impl Operation {
     }
 }
 
-/// A named value that the nodes behind the front need.
+/// A named value of the front that nodes after the front need.
 #[derive(Debug)]
 pub(crate) struct Exit {
     pub(crate) name: String,
@@ -89,7 +88,7 @@ pub(crate) struct Front {
     /// Channels, rows and columns of the result of each operation.
     pub(crate) sides: Vec<[usize; 3]>,
     pub(crate) exits: Vec<Exit>,
-    /// Indices of the nodes behind the front.
+    /// Indices of the nodes after the front.
     pub(crate) behind: HashSet<usize>,
     /// Largest padding of any convolution, in rows or columns.
     pub(crate) border: usize,
@@ -148,7 +147,7 @@ impl Front {
         }
     }
 
-    /// Merges a sum into a convolution that is its input, if no other operation uses that convolution's result.
+    /// Merges each sum into a convolution that is one of its inputs, if no other operation uses the result of that convolution.
     fn fuse(&mut self) {
         let mut uses = vec![0_usize; self.operations.len()];
         let taken = self.operations.iter().flat_map(Operation::takes);
@@ -321,7 +320,7 @@ impl<'a> Finding<'a> {
         self.give(Operation::Sum { of, repeat }, sides)
     }
 
-    /// Traces the outputs back to the values of the front.
+    /// Follows the outputs back to the values of the front.
     fn look_behind(&mut self) -> Result<(), NoFront> {
         let nodes = &self.source.graph.node;
         let mut makers: HashMap<&str, usize> = HashMap::new();
@@ -356,7 +355,7 @@ impl<'a> Finding<'a> {
         Ok(())
     }
 
-    /// Returns an error that names the node, or the first unsupported node before it.
+    /// Returns an error that names the node, or the first unsupported node on the way to it.
     fn refused(&self, at: usize, node: &NodeProto) -> NoFront {
         let first = self.refused.iter().filter(|(refused, _)| **refused <= at);
         let first = first.min_by_key(|(refused, _)| **refused);
@@ -378,10 +377,11 @@ impl<'a> Finding<'a> {
 
 /// Minimum number of input and output channels at which a convolution in tiles is faster than a direct one.
 const FEWEST_CHANNELS: usize = 32;
-/// Minimum number of outputs of a channel. With fewer outputs, reading the transformed weights takes longer than the products.
+/// Minimum number of outputs per channel at which a convolution in tiles is faster. With fewer outputs, reading the transformed weights
+/// takes longer than the products.
 const FEWEST_OUTPUTS: usize = 64;
 
-/// Returns true if a convolution is large enough to be faster in tiles.
+/// Returns true if a convolution is so large that tiles make it faster.
 fn is_large(size: ConvSize, [rows, cols]: [usize; 2]) -> bool {
     size.inputs.min(size.outputs) >= FEWEST_CHANNELS && rows * cols >= FEWEST_OUTPUTS
 }

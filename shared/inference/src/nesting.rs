@@ -1,8 +1,7 @@
 //! Checks that the messages in a file are nested as in an ONNX file.
 //!
-//! The library that reads the file trusts the lengths in it. If a length points backwards, the library loops for ever, and it allocates
-//! memory of
-//! any size. Lengths are therefore checked first. Field numbers are those of the published `onnx.proto`.
+//! The library that reads the file trusts the lengths in it. If a length leads backwards, the library loops for ever. It also allocates as
+//! much memory as a length asks for. Lengths are therefore checked first. Field numbers are those of the published `onnx.proto`.
 
 /// Largest nesting depth.
 const MAX_DEPTH: usize = 32;
@@ -41,7 +40,7 @@ impl Kind {
     }
 }
 
-/// Position of the first byte at which the nesting is wrong, from 0.
+/// Position, from 0, of the first byte at which the nesting is wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the file is truncated or not an ONNX file: byte {at} is unexpected")]
 pub(crate) struct MalformedFile {

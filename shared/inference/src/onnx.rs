@@ -62,7 +62,7 @@ pub struct Constant {
     pub name: String,
     /// Shape of the constant.
     pub shape: Vec<usize>,
-    /// Values; their number follows from the shape.
+    /// Values. Their number must match the shape.
     pub values: Values,
 }
 

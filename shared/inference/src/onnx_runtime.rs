@@ -56,7 +56,7 @@ impl OnnxRuntime {
         Self { provider, ..self }
     }
 
-    /// Loads a network, and returns the device on which it runs.
+    /// Loads a network. Also returns the device on which the network runs.
     pub(crate) fn load_network(
         &self,
         file: &[u8],

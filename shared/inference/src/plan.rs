@@ -6,7 +6,7 @@ use kernels::{Blocked, BlockedShape, Conv, Isa, Outputs, Scratch, add_repeated};
 
 use crate::front::{Front, Operation, Value};
 
-/// Steps of a run, and the memory blocks that they read and write.
+/// The steps of a run, and the memory blocks that these steps read and write.
 #[derive(Debug)]
 pub(crate) struct Plan {
     isa: Isa,
@@ -14,7 +14,7 @@ pub(crate) struct Plan {
     /// Shapes of the memory blocks; the first is the input.
     places: Vec<BlockedShape>,
     exits: Vec<Exit>,
-    /// Memory of earlier runs. Several threads may run at the same time.
+    /// Memory of earlier runs, to be used again. There may be several, because several threads may run the front at the same time.
     spare: Mutex<Vec<Memory>>,
 }
 
@@ -28,7 +28,7 @@ struct Exit {
 #[derive(Debug)]
 struct Step {
     work: Work,
-    /// Blocks that hold the unchanged values, and the values with negative ones replaced by zeros.
+    /// Indices of two blocks: one with the unchanged values, and one with negative values replaced by zero.
     outputs: [Option<usize>; 2],
 }
 
@@ -58,7 +58,7 @@ struct Memory {
 struct Places {
     shapes: Vec<BlockedShape>,
     free: Vec<usize>,
-    /// Blocks of each stack: those that hold the unchanged values, and those in which zeros replace negative values.
+    /// For each stack of channels, the indices of two blocks: one with the unchanged values, and one with negative values replaced by zero.
     of_stacks: Vec<[Option<usize>; 2]>,
     /// Number of steps that have yet to read each of these blocks.
     readers: Vec<[usize; 2]>,
@@ -155,7 +155,7 @@ impl Plan {
         self.places[0].sides()
     }
 
-    /// Runs the front on a picture, given channel by channel and row by row, and passes on the shapes and values of the exits.
+    /// Runs the front on a picture, given channel by channel and row by row, and passes the shapes and values of its outputs to the caller.
     pub(crate) fn run<T>(
         &self,
         picture: &[f32],

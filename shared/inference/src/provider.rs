@@ -27,7 +27,7 @@ pub enum Place {
     Processor,
     /// On the first NVIDIA GPU.
     Cuda,
-    /// On the processor because CUDA cannot start, with the reason.
+    /// On the processor because CUDA cannot start. The text is the reason.
     ProcessorForCuda(String),
 }
 

@@ -1,4 +1,4 @@
-//! Writes a file with the part of a network behind the front.
+//! Writes a file with the part of a network that comes after the front.
 
 use std::collections::HashSet;
 
@@ -25,8 +25,8 @@ struct Field<'a> {
     content: &'a [u8],
 }
 
-/// Returns the file without the front: the outputs of the front become inputs, beside the network's own inputs. Returns `None` if there is
-/// nothing behind the front.
+/// Returns the file without the front: the outputs of the front become additional inputs. Returns `None` if there is nothing after the
+/// front.
 ///
 /// * `file`: bytes of a file whose nesting has been checked.
 pub(crate) fn rest(file: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
@@ -63,7 +63,7 @@ fn graph(bytes: &[u8], source: &Source, front: &Front) -> Option<Vec<u8>> {
                 let constant = source.graph.initializer.get(n_constants - 1)?;
                 taken.contains(constant.name.as_deref()?)
             }
-            // The descriptions may refer to removed values.
+            // The descriptions of intermediate values are left out, because they may refer to removed values.
             VALUE_INFO => false,
             _ => true,
         };

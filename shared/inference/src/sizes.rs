@@ -1,4 +1,4 @@
-//! Checks the sizes that the nodes of a network state as constants, because the library allocates memory of any size.
+//! Checks the sizes that are given as constants in a network, because the library would allocate memory of any size.
 
 use std::collections::HashMap;
 
@@ -37,7 +37,7 @@ const INPUTS: [(&str, &[usize]); 9] = [
     ("Range", &[0, 1]),
 ];
 
-/// A size above any that a network needs.
+/// Error for a size that is larger than any network needs.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("node {node:?} ({op}): {what} {value} exceeds the limit ({most})")]
 pub(crate) struct TooLarge {
@@ -48,7 +48,7 @@ pub(crate) struct TooLarge {
     most: i64,
 }
 
-/// Checks all nodes of a file. A file that cannot be read is not refused here, because the library refuses it.
+/// Checks all nodes of a file. A file that cannot be read is accepted here, because the library reports it later.
 pub(crate) fn check(file: &[u8]) -> Result<(), TooLarge> {
     let graph = ModelProto::parse_buf(file).ok().and_then(|model| model.graph);
     graph.map_or(Ok(()), |graph| check_graph(&graph, DEEPEST))

@@ -1,4 +1,4 @@
-//! A network as described in its file: operations by the names of their inputs, and constants.
+//! A network as described in its file: its constants, and its operations with the names of their inputs.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,7 @@ use rten_onnx::onnx::{GraphProto, ModelProto, NodeProto, TensorProto};
 
 const FLOAT: i32 = 1;
 const FLOAT16: i32 = 10;
-/// Maximum number of casts between a constant and its use.
+/// Maximum number of casts between a constant and the node that uses it.
 const MOST_CASTS: usize = 4;
 
 /// The graph of a file.

@@ -215,7 +215,7 @@ fn weights_that_do_not_fit_the_input_are_an_error() {
 fn a_file_that_is_cut_off_is_refused() {
     let file = residual([3, 4, 5], [4, 4], true);
     for n in (0..file.len()).step_by(97) {
-        // Loading must never panic. A truncated file may still be readable.
+        // Loading a truncated file must never panic, but may succeed.
         if let Ok(session) = Session::parse(file[..n].to_vec()) {
             assert_ne!(session.run_by(), &RunBy::Parallax);
         }
