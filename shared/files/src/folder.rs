@@ -1,5 +1,5 @@
-//! A folder that files are written to. All its files are opened relative to the folder's descriptor, and no link in it is followed. Other
-//! users with write access therefore cannot redirect a file.
+//! A folder that files are written to. All files in it are opened relative to the folder's descriptor, and no link in the folder is
+//! followed. Other users with write access therefore cannot redirect a file.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -93,7 +93,7 @@ impl Folder {
         Ok(is_open.then(|| "may be written to by every user".to_owned()))
     }
 
-    /// Creates a file. A file of the same name that a killed process left is removed.
+    /// Creates a file. An existing file of the same name, left by a killed process, is removed.
     ///
     /// # Errors
     ///
@@ -157,7 +157,7 @@ impl Folder {
         };
         let placed = written();
         if placed.is_err() {
-            // The first error is reported; an error of the removal would add nothing to it.
+            // Only the first error is reported, because an error of the removal would add no information.
             drop(self.remove_named(&beside));
         }
         placed
@@ -193,7 +193,7 @@ impl Folder {
             opened => File::from(opened?),
         };
         let found = file.metadata()?;
-        // A file with a second name (hard link) may belong elsewhere.
+        // A file with a second name (hard link) may be the file of another program.
         if !found.is_file() || found.uid() != geteuid().as_raw() || found.nlink() > 1 {
             return Err(self.in_the_way(name));
         }
@@ -209,7 +209,7 @@ impl Folder {
         })
     }
 
-    /// Returns the error for a name that belongs to something that must not be written to.
+    /// Returns the error for a name that belongs to something to which this crate must not write.
     fn in_the_way(&self, name: &OsStr) -> io::Error {
         let text = match self.kind(name) {
             Ok(kind) => format!(
@@ -223,7 +223,7 @@ impl Folder {
     }
 }
 
-/// The kind of file that has a name.
+/// The kind of file that currently has a given name.
 struct Kind {
     mode: u32,
     owner: u32,
@@ -266,7 +266,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns a folder with a secret file next to it.
+    /// Returns a folder, and a secret file next to it.
     fn room() -> (tempfile::TempDir, Folder, PathBuf) {
         let base = tempfile::tempdir().unwrap();
         let secret = base.path().join("secret");

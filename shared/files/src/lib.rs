@@ -1,4 +1,5 @@
-//! Reading and writing of a user's files: regular files only, always complete or absent, and never through another user's link.
+//! Reading and writing of a user's files. Only regular files are read. A written file is always either complete or absent, and links of
+//! other users are not followed.
 #![forbid(unsafe_code)]
 
 mod folder;

@@ -1,4 +1,4 @@
-//! Reading of regular files. A pipe would block, and a device such as `/dev/zero` never ends.
+//! Reading of regular files only: reading a pipe could block, and reading a device such as `/dev/zero` never ends.
 
 use std::fs::{File, FileType};
 use std::io::{self, ErrorKind, Read as _};

@@ -1,4 +1,4 @@
-//! Files that are always complete or absent: written under a temporary name, then renamed.
+//! Writing of files that are always complete or absent: they are written under a temporary name, then renamed.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -12,7 +12,7 @@ use crate::Folder;
 ///
 /// The data is written to `.name.<process id>.part` in the same folder, flushed to the disk, and renamed. If the process is killed, at most
 /// this temporary file remains. The permissions are those of a new file, regardless of the old ones. Links are followed only in the path of
-/// the folder.
+/// the file's folder.
 ///
 /// # Errors
 ///

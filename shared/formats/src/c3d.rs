@@ -2,8 +2,8 @@
 //! files as Intel reals ([`write()`]).
 //!
 //! This crate has its own reader because published ones reject many old files from laboratories, although these files contain all the data
-//! needed. They may lack `POINT:UNITS` or `ANALOG:RATE`, or store an offset as a real. Analog samples are skipped. Memory is allocated only
-//! for data that is in the file, never for a declared count. The format is described in *The C3D File Format* (c3d.org).
+//! needed. For example, they lack `POINT:UNITS` or `ANALOG:RATE`, or store an offset as a real. Analog samples are skipped. Memory is
+//! allocated only for data that is in the file, never for a declared count. The format is described in *The C3D File Format* (c3d.org).
 //!
 //! ```
 //! let file = include_bytes!("../examples/walk.c3d");

@@ -6,7 +6,7 @@ use std::path::Path;
 use failure::{ExitKind, Failure};
 use geometry::files::RigFileError;
 
-/// Returns the outcomes of all cameras, or the first failure with a hint about the other cameras that failed.
+/// Returns the outcomes of all cameras, or the failure of the first camera that failed, with a hint about the other cameras that failed.
 ///
 /// * `cameras`: names and outcomes.
 ///

@@ -1,4 +1,4 @@
-//! Location of the card of an ONNX file.
+//! Search for the card of an ONNX file, the text that describes how Parallax uses the network.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ impl OnnxFile {
 }
 
 impl CardText {
-    /// Returns the card of a network from a file: the given one, or one beside the network.
+    /// Returns the card of a network from a file: the given file, or a file beside the network.
     fn beside(network: &Path, given: Option<&Path>) -> Result<Option<Self>, Failure> {
         let Some(file) = given.map(Path::to_path_buf).or_else(|| card_beside(network)) else {
             return Ok(None);
@@ -133,7 +133,7 @@ pub fn card_beside(network: &Path) -> Option<PathBuf> {
     places.into_iter().find(|place| place.is_file())
 }
 
-/// Returns the failure of a network that does not fit its card.
+/// Returns the failure for a network that does not match its card.
 pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
     let message = format!(
         "{} does not match its card ({place}): {}",

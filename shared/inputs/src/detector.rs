@@ -53,7 +53,7 @@ impl DetectorFile {
     ///
     /// # Errors
     ///
-    /// Fails if the detector has no card, or does not fit its card.
+    /// Fails if the detector has no card, or does not match its card.
     pub fn fitted(self) -> Result<Detector, Failure> {
         let Self {
             path,

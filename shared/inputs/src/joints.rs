@@ -1,4 +1,4 @@
-//! Positions of joints relative to the parts of a model: from a named file, or from the file that ships with the model.
+//! Positions of joints relative to the parts of a model: from a file that the user names, or from the file that ships with the model.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ impl Joints {
     /// Chooses the joints of a model.
     ///
     /// * `file`: file of joints. `shipped` means the shipped file, which is used only for the model that it was trained with. `none` means
-    ///   that a joint is the centre of its part.
+    ///   that each joint is the centre of its part.
     /// * `model`: file of the model; `None` for the model that ships.
     ///
     /// # Errors
@@ -55,7 +55,7 @@ impl Joints {
         ))
     }
 
-    /// Returns the map from parts to the joints of a set; without a map, a joint is one of the parts.
+    /// Returns the map from parts to the joints of a set; without a map, each joint is the centre of a part.
     ///
     /// * `learned`: a consistency file. If it has a map of its own, that map takes precedence over the shipped file of joints.
     pub fn map(&self, learned: Option<&Learned>, set: &JointSet) -> Option<Arc<JointMap>> {
@@ -64,7 +64,7 @@ impl Joints {
         learned.or_else(|| self.file.as_ref()?.map(set))
     }
 
-    /// Returns a text that differs for different joints.
+    /// Returns a text that identifies these positions of joints: it differs if they differ.
     pub fn fingerprint(&self) -> String {
         let text = self.file.as_ref().and_then(|file| file.write().ok());
         text.map_or_else(String::new, |text| {

@@ -1,5 +1,6 @@
-//! Files that users name, read and checked before any process starts: rigs, models, networks with their cards, tables, and the files that
-//! ship. This crate also reads pictures and videos for trying networks. Every error names the file and suggests what to do.
+//! Reads and checks the files that users name, before any process starts: rigs, models, networks with their cards, tables, and the files
+//! that ship with Parallax. This crate also reads pictures and videos for trying networks. Every error names the file and suggests what to
+//! do.
 #![forbid(unsafe_code)]
 
 pub mod advice;
@@ -219,7 +220,7 @@ pub fn orientation(file: &Path, model: &Model) -> Result<Option<Arc<Detector>>, 
     Ok(Some(Arc::new(Detector::new(network))))
 }
 
-/// Returns the part-type tables of all pairs of the given cameras: those named in the settings, otherwise the learned ones.
+/// Returns the part-type tables of all pairs of the given cameras: the tables named in the settings, otherwise the learned tables.
 ///
 /// # Errors
 ///
@@ -327,7 +328,7 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
 
-/// Adds the origin of the data to a failure to read an input, if the deployment file gives it.
+/// Adds the origin of the data to a failure to read an input, if the deployment file states this origin.
 pub fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
     match &deployment.data {
         Some(data) if failure.kind() == ExitKind::Input => {

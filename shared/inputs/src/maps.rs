@@ -73,7 +73,7 @@ pub fn open_network(
     NetworkFile::open_with(file, card, library)
 }
 
-/// Returns the card of a camera's network; `None` without a network or a card.
+/// Returns the card of a camera's network; `None` if there is no network or no card.
 ///
 /// # Errors
 ///
@@ -100,7 +100,7 @@ pub fn detector(deployment: &Deployment) -> Result<Detector, Failure> {
     crate::detector::open_with(&config.detector, None, &library)
 }
 
-/// Loads every network of a deployment once, to check that each fits its card.
+/// Loads every network of a deployment once, to check that each network matches its card.
 ///
 /// # Errors
 ///

@@ -2,7 +2,7 @@
 
 use fmp::Layout;
 
-/// Memory of a whole search per byte of the responses; the measured value is 1.53.
+/// Memory that a whole search needs, in bytes per byte of the responses. The measured value is 1.53.
 const SHARE_OF_RESPONSES: f64 = 1.6;
 
 /// Error for a search that needs more memory than this machine has free.
@@ -25,7 +25,7 @@ fn available_bytes() -> Option<u64> {
     Some(1024 * kib)
 }
 
-/// Refuses a search that needs more memory than this machine has free.
+/// Checks that this machine has enough free memory for a search.
 ///
 /// # Errors
 ///

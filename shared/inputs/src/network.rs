@@ -34,7 +34,7 @@ pub struct NetworkFile {
 impl NetworkFile {
     /// Reads a network, and its card if there is one.
     ///
-    /// * `card`: file of the card. If it is `None`, the card is the first of these that exists: the file beside the network whose ending
+    /// * `card`: file of the card. If it is `None`, the card is the first of these that exists: a file beside the network, in whose name
     ///   `.toml` replaces or follows `.onnx`; the entry [`METADATA_KEY`](crate::cards::METADATA_KEY) of the network.
     ///
     /// # Errors
@@ -97,7 +97,7 @@ impl NetworkFile {
     ///
     /// # Errors
     ///
-    /// Fails if the network has no card, or does not fit its card.
+    /// Fails if the network has no card, or does not match its card.
     pub fn fitted(self) -> Result<PoseNetwork, Failure> {
         let Self {
             path,
@@ -145,8 +145,8 @@ pub fn look<'a>(
     })
 }
 
-/// Returns the box that best fits a person who was seen in a given box, as a deployment determines it ([`Looker::look_closer`]), and the
-/// rotation of the picture in that box.
+/// Returns the box that best fits a person who was seen in a given box, and the rotation of the picture in that box. The box is determined
+/// by the method that a run uses ([`Looker::look_closer`]).
 ///
 /// * `outline`: box in which the person is seen, in pixels of the picture.
 ///

@@ -125,7 +125,7 @@ pub fn count(path: &Path, frames: Frames) -> usize {
     source.map_or(1, |source| source.info().n_frames as usize)
 }
 
-/// A picture prepared for the search, possibly at a smaller size.
+/// A picture prepared for the search, possibly reduced in size.
 #[derive(Debug)]
 pub struct Searched {
     /// Pyramid of the searched image.

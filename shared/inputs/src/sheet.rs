@@ -24,7 +24,7 @@ pub struct Skeleton {
     pub score: f32,
 }
 
-/// Returns a line from every part to its parent, in the colour of its side.
+/// Returns a line from every part to its parent, in the colour for the left or right side of the body.
 pub fn limbs(model: &Model) -> Vec<Limb> {
     let limb = |(to, part): (usize, &fmp::PartSpec)| {
         let side = match &part.name {
@@ -137,7 +137,7 @@ impl Sheet {
     }
 }
 
-/// Returns the size of the thumbnail of an image, and the number of thumbnail pixels per pixel.
+/// Returns the size of the thumbnail of an image, and the number of thumbnail pixels per pixel of the image.
 fn shrunk(size: Size) -> (Size, f64) {
     let scale = SIDE_PX as f64 / size.width.max(size.height).max(1) as f64;
     let side = |value: usize| ((value as f64 * scale).round() as usize).max(1);

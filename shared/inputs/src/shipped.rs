@@ -78,7 +78,7 @@ impl Shipped {
         Self::ALL.into_iter().find(|kind| kind.bytes() == bytes)
     }
 
-    /// Returns the file with the given unique name.
+    /// Returns the shipped file with the given unique name.
     pub fn of_name(name: &Path) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }

@@ -60,8 +60,7 @@ impl Unit {
 
     /// The training label for an error.
     ///
-    /// * `error`, `tile_height`: distance from the truth, and height that the tile shows, in the
-    ///   same unit.
+    /// * `error`, `tile_height`: distance from the true position, and height that the tile shows, in the same unit.
     pub fn label(self, error: f64, tile_height: f64) -> f64 {
         match self {
             Self::Pixels => error,
@@ -89,11 +88,11 @@ impl Unit {
 /// The description of a network besides its graph.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Card {
-    /// Size of the tile; by default the size of the input.
+    /// Size of the tile; if `None`, the size of the network's input.
     pub tile: Option<TileShape>,
-    /// The normalisation of colours; by default that of `ImageNet`.
+    /// The normalisation of colours; by default the one of networks trained on `ImageNet`.
     pub colours: Normalisation,
-    /// The version of the [`evidence`](crate::evidence()) that the network takes; by default none.
+    /// The version of the [`evidence`](crate::evidence()) that the network takes; `None` if it takes no evidence.
     pub evidence: Option<u32>,
     /// The unit of the network's output; by default pixels.
     pub unit: Unit,
@@ -130,7 +129,7 @@ pub enum CardError {
         /// The accepted values.
         expected: String,
     },
-    /// The name is unknown: it is misspelt, or belongs to a later version.
+    /// The name of an entry is unknown: it is misspelt, or belongs to a later version.
     #[error("`{key}` is not an entry of version {VERSION}")]
     Unknown {
         /// The first characters of the name.

@@ -13,15 +13,13 @@ pub const N_TYPES: usize = 6;
 /// Values of every part, in this order, followed by the types.
 ///
 /// * `response`, `contrast`, `margin`: see [`LocalScore`].
-/// * `spring`: score of the spring to the parent, at most 0 or slightly above; 0 for the root.
+/// * `spring`: score of the spring to the parent, at most slightly above 0; 0 for the root.
 /// * `pair_bias`: score of the pair of types of part and parent; 0 for the root.
 /// * `x`, `y`: position of the part's centre relative to the tile's centre, in heights of the tile.
-/// * `from_mirror`: distance to the part on the other side of the body, in box sides; 0 if the part is its
-///   own mirror.
+/// * `from_mirror`: distance to the corresponding part on the other side of the body, in box sides; 0 if the part is its own mirror.
 /// * `from_second`: distance to the same part of the second candidate, in box sides, at most [`FAR`].
 ///   Without a second candidate, it is [`FAR`].
-/// * `inside`: distance to the nearest border of the frame, in box sides, from minus to plus [`FAR`];
-///   negative outside the frame.
+/// * `inside`: distance to the nearest border of the frame, in box sides, limited to [`FAR`]; negative outside the frame.
 /// * `type_1` to `type_6`: 1 for the part's type, else 0.
 pub const PART_NUMBERS: [&str; 10] = [
     "response",
@@ -36,7 +34,7 @@ pub const PART_NUMBERS: [&str; 10] = [
     "inside",
 ];
 
-/// Values of the pose as a whole, after those of the parts.
+/// Values of the pose as a whole, which follow the values of the parts.
 ///
 /// * `score`: score of the pose.
 /// * `lead`: the score minus the score of the second candidate, at most [`FAR`]. Without a second candidate, it is
@@ -57,7 +55,7 @@ pub const POSE_NUMBERS: [&str; 8] = [
     "springs",
 ];
 
-/// Limit of values, in box sides or in units of the score.
+/// Largest absolute value of distances, in box sides, and of differences of scores.
 pub const FAR: f32 = 10.0;
 
 /// Used instead of minus infinity for a pair of types that the model rules out.
@@ -111,8 +109,8 @@ pub enum EvidenceError {
     },
 }
 
-/// Writes the properties of the best candidate: [`n_evidence`] values without scaling. For every part, these are
-/// [`PART_NUMBERS`] and the types; [`POSE_NUMBERS`] follow. The network has to scale the values.
+/// Writes the properties of the best candidate: [`n_evidence`] values without scaling. The values are [`PART_NUMBERS`] and the types for
+/// every part, then [`POSE_NUMBERS`]. The network has to scale them.
 ///
 /// * `candidates`: candidates of the frame, best first; the first is the pose.
 /// * `scores`: local scores of the pose; see [`fmp::local_scores`].

@@ -19,7 +19,7 @@ pub struct Forecaster {
 pub struct ForecastInput<'a> {
     /// Image of the frame.
     pub image: Rgb8View<'a>,
-    /// The model of the person, and the pyramid of the frame.
+    /// The model of the person, and the layout of the frame's pyramid.
     pub on: (&'a Model, &'a Layout),
     /// The candidates of the pose search, best first.
     pub candidates: &'a [Pose],
@@ -37,15 +37,15 @@ pub struct Forecast {
     pub tile: Tile,
     /// Expected error of every part, in pixels of the frame.
     pub sigma_px: Vec<f32>,
-    /// Errors above which parts are switched off according to the network's file, in pixels of the
-    /// frame; may be empty.
+    /// Thresholds in the network's file, in pixels of the frame. A part is switched off if its expected error is above the threshold. The
+    /// list may be empty.
     pub tau_px: Vec<f32>,
 }
 
 /// Reason why there is no prediction for a frame.
 #[derive(Debug, thiserror::Error)]
 pub enum ForecastError {
-    /// There is no candidate, or the network is not made for poses of this kind.
+    /// There is no candidate, or the network does not support poses of this kind.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
     /// The box around the pose is empty or not finite.
@@ -213,7 +213,7 @@ mod tests {
 
     #[test]
     fn relative_errors_scale_with_the_tile_at_every_frame_scale() {
-        // The box is 12 pixels wide. With the shape of the tile, the tile is 16 pixels high, plus a tenth.
+        // The box is 12 pixels wide. A tile of this shape around it is 16 pixels high, plus a tenth.
         for frame_scale in [0.25, 1.0, 3.0] {
             let forecast = run(&mut constant(0.1, Unit::Relative, 0.2), frame_scale).unwrap();
             assert!((forecast.tile.height_px() - 17.6).abs() < 1e-9);

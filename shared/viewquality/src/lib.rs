@@ -1,9 +1,8 @@
-//! Expected errors of the parts of a view: the paper's sigma (section 4.3).
+//! Expected errors of a person's parts in one view: the paper's sigma (section 4.3).
 //!
-//! A [`Network`] predicts the errors from the person's [`Tile`] and, optionally, the [`evidence()`]. A
-//! [`Card`] is the description in the network's file. [`Forecaster`] runs all steps. [`Table`] contains
-//! predictions that were made elsewhere, and [`Predictor`] returns the predictions of one view, frame by
-//! frame. [`Tau`] contains the thresholds above which a part is switched off.
+//! A [`Network`] predicts the errors from the person's [`Tile`] and, optionally, the [`evidence()`]. A [`Card`] is the description in the
+//! network's file. [`Forecaster`] runs all steps. [`Table`] contains predictions that were made by another program, and [`Predictor`]
+//! returns the predictions of one view, frame by frame. [`Tau`] contains the thresholds above which a part is switched off.
 #![forbid(unsafe_code)]
 
 mod card;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::Table;
 
-/// The sequence of a table that corresponds to a deployment, and the numbering of its frames.
+/// Selects the sequence of a table that corresponds to a deployment, and converts frame numbers.
 ///
 /// By default the frame numbers of the table are those of the deployment.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -91,8 +91,8 @@ impl Predictor {
         }
     }
 
-    /// Expected error of every part in a frame of the deployment, in pixels. Returns `None` if there is no prediction; every part then
-    /// counts as usable.
+    /// Expected error of every part in a frame of the deployment, in pixels. Returns `None` if there is no prediction. In this case, every
+    /// part counts as usable.
     pub fn sigma_px(&self, frame: u64) -> Option<&[f32]> {
         match self {
             Self::Table { selection, rows } => {

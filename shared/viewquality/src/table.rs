@@ -1,4 +1,4 @@
-//! Expected errors that were predicted elsewhere, read from a CSV file.
+//! Expected errors that were predicted by another program, read from a CSV file.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;

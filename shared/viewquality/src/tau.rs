@@ -1,6 +1,6 @@
 //! Thresholds of the expected error above which a part is switched off.
 
-/// The authors' measurements on a training set, in pixels of its images, one value per part.
+/// Measurements by the authors of the paper on a training set, in pixels of the set's images, one value per part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainingErrors {
     /// Median error of the single-view pose.
@@ -80,15 +80,14 @@ impl Tau {
         Self::median_and_inaccuracy(&TrainingErrors::UMPM)
     }
 
-    /// The paper's rule: the median training error alone.
+    /// Thresholds by the rule in the paper: the median training error alone.
     pub fn median_only(errors: &TrainingErrors) -> Self {
         Self {
             px: errors.median_px.to_vec(),
         }
     }
 
-    /// The rule of the authors' program: median training error plus mean inaccuracy of its
-    /// prediction.
+    /// Thresholds by the rule of the authors' program: the median training error plus the mean inaccuracy of its prediction.
     pub fn median_and_inaccuracy(errors: &TrainingErrors) -> Self {
         let both = errors.median_px.iter().zip(&errors.inaccuracy_px);
         Self {

@@ -4,8 +4,8 @@ use kernels::Rgb8View;
 
 /// Height shown by a tile, relative to the height of the person's box.
 ///
-/// The box already extends half a part beyond the outermost centres. The margin shows the network
-/// the surroundings of the limb ends.
+/// The box already extends half a part beyond the outermost centres. Because of the margin, the network also sees the surroundings of the
+/// ends of limbs.
 const MARGIN: f64 = 1.1;
 
 /// The size of a tile in pixels.
@@ -23,7 +23,7 @@ impl TileShape {
         height: 160,
         width: 64,
     };
-    /// The tile of VGG-16. Halving it five times leaves 5 x 1.
+    /// The tile of VGG-16. Halved five times, it becomes 5 x 1.
     pub const VGG16: Self = Self {
         height: 160,
         width: 48,
@@ -48,7 +48,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// The smallest tile that shows a box and a margin of a tenth.
+    /// Returns the smallest tile that shows a box with a margin of a tenth.
     ///
     /// For a box of width `b` and height `h`, the tile shows a height of `1.1 max(h, b H / W)` pixels of the frame
     /// around the box's centre. `H x W` is the tile's shape.
@@ -70,8 +70,7 @@ impl Tile {
         })
     }
 
-    /// Height that the tile shows, in pixels of the frame. Relative errors refer to this size of the
-    /// person.
+    /// Height that the tile shows, in pixels of the frame. Relative errors are fractions of this height.
     pub fn height_px(&self) -> f64 {
         self.shape.height as f64 * self.scale
     }
@@ -125,9 +124,9 @@ pub struct Sampler {
 /// The pixels of a row or column of the frame whose weighted mean is a pixel of the tile.
 #[derive(Debug, Clone, Copy)]
 struct Taps {
-    /// Index of the first pixel. It may be outside the frame, where the border is repeated.
+    /// Index of the first pixel. It may be outside the frame; there, the border of the frame is repeated.
     first: i64,
-    /// Index of the first weight, and the number of weights.
+    /// Index of the first weight. The next field is the number of weights.
     begin: usize,
     count: usize,
 }
@@ -135,12 +134,10 @@ struct Taps {
 impl Sampler {
     /// Resamples a tile from its frame, as `3 x height x width` normalised values.
     ///
-    /// Every pixel is a weighted mean, first over one direction, then over the other. The weight of
-    /// a pixel of the frame falls linearly to 0 at `max(1, s)` pixels from the position of the
-    /// tile's pixel, where `s` is the scale. This is bilinear interpolation if the tile is the finer grid, and an
-    /// average without aliasing if it is the coarser one. Outside the frame, its border is repeated.
-    /// Sums are computed in f32 in ascending order, columns first, so that the same frame and tile
-    /// give the same bits everywhere.
+    /// Every pixel is a weighted mean, first over one direction, then over the other. The weight of a pixel of the frame falls linearly to
+    /// 0 at `max(1, s)` pixels from the position of the tile's pixel, where `s` is the scale. This is bilinear interpolation if the tile
+    /// has the higher resolution, and averaging without aliasing if it has the lower one. Outside the frame, the border of the frame is
+    /// repeated. Sums are computed in f32 in ascending order, columns first, so that the same frame and tile give the same bits everywhere.
     ///
     /// * `out`: [`TileShape::n_values`] values, overwritten; red, green, blue planes, row major.
     ///
@@ -195,7 +192,7 @@ impl Sampler {
         }
     }
 
-    /// First column of the frame that the tile needs, and the one after the last.
+    /// First column of the frame that the tile needs, and the column after the last one.
     fn columns(&self, height: usize, image_width: usize) -> [usize; 2] {
         let inside = |value: i64| value.clamp(0, image_width as i64 - 1) as usize;
         let columns = &self.taps[height..];
@@ -207,7 +204,7 @@ impl Sampler {
         [first.unwrap_or(0), last.map_or(1, |value| value + 1)]
     }
 
-    /// Writes the weighted mean of the frame's rows for one row of the tile to `band`.
+    /// Writes to `band` the weighted mean of the frame's rows for one row of the tile.
     fn mix_rows(&mut self, image: Rgb8View<'_>, row: usize, [left, right]: [usize; 2]) {
         let taps = self.taps[row];
         self.band.fill(0.0);
@@ -220,7 +217,7 @@ impl Sampler {
         }
     }
 
-    /// The weighted mean of the mixed row's pixels for one column of the tile.
+    /// The weighted mean, for one column of the tile, of the pixels in the row that [`Self::mix_rows`] has written.
     fn mix_columns(&self, taps: usize, image_width: usize, [left, _]: [usize; 2]) -> [f32; 3] {
         let taps = self.taps[taps];
         let mut mean = [0.0; 3];

@@ -3,12 +3,12 @@
 /// Reason why a C3D file was refused.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum C3dError {
-    /// The file ends before required or declared data.
+    /// The file ends before data that is required or declared.
     #[error("the file has {got} bytes, {what} would end at byte {needed}")]
     Short {
         /// Name of the item that is cut off.
         what: &'static str,
-        /// Position at which the item would end.
+        /// Position in the file at which the item would end, in bytes.
         needed: u64,
         /// Number of bytes in the file.
         got: u64,

@@ -1,4 +1,4 @@
-//! The header, and the points, whose position in the file it gives.
+//! The header, and the points of the trial. The header gives the position of the points in the file.
 
 use crate::c3d::C3dError;
 use crate::c3d::numbers::{BLOCK, Bytes};
@@ -15,7 +15,7 @@ pub(crate) struct Header {
     scale: f32,
     /// Position at which the points begin.
     data: usize,
-    /// Number of analog values that follow the points of a frame.
+    /// Number of analog values that follow the points of each frame.
     n_analog: usize,
 }
 

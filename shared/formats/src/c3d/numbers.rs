@@ -1,4 +1,4 @@
-//! The bytes of a file, and its numbers in the format of its processor.
+//! The bytes of a file, and the decoding of numbers in the format of the processor that wrote them.
 
 use crate::c3d::C3dError;
 
@@ -82,7 +82,7 @@ impl<'a> Bytes<'a> {
         }
     }
 
-    /// Decodes a real. DEC's F format has its two words exchanged, and an exponent that is larger by 2.
+    /// Decodes a real. In DEC's F format, the two words are swapped, and the exponent is larger by 2.
     pub(crate) fn f32_of(&self, bytes: [u8; 4]) -> f32 {
         match self.processor {
             Processor::Intel => f32::from_le_bytes(bytes),

@@ -31,8 +31,8 @@ const HEAD: usize = 4;
 impl<'a> Parameters<'a> {
     /// Reads the section that begins at byte `section`.
     ///
-    /// A link that points outside the section is ignored, because the length of an entry also follows from its content. Samples of c3d.org
-    /// have a link with exchanged bytes.
+    /// A link that points outside the section is ignored, because the length of an entry also follows from its content. Sample files of
+    /// c3d.org have a link whose bytes are swapped.
     pub(crate) fn read(bytes: Bytes<'a>, section: usize) -> Result<Self, C3dError> {
         const WHAT: &str = "a parameter";
         let mut parameters = Self {
@@ -68,7 +68,7 @@ impl<'a> Parameters<'a> {
             }
             at = link + offset;
             if n_blocks > 0 && at >= end {
-                // The length of a description and the description follow the value.
+                // The value is followed by the length of the description and the description itself.
                 at = own_end + 1 + usize::from(bytes.u8(own_end, WHAT)?);
             }
         }

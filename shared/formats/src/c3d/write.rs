@@ -10,7 +10,7 @@ const MAX_TEXT: usize = 127;
 const MAX_TEXTS: usize = 255;
 /// Maximum number of blocks of parameters; one byte holds the number.
 const MAX_BLOCKS: usize = 255;
-/// Maximum number of steps of a residual; one byte holds it.
+/// Maximum number of steps of a residual; one byte holds the number.
 const MAX_RESIDUAL: f64 = 255.0;
 
 /// Header of a file, before its points; see [`write()`].
@@ -28,9 +28,10 @@ pub struct Heading<'a> {
     pub descriptions: &'a [String],
     /// Number of frames that follow.
     pub n_frames: u32,
-    /// Number of the first frame, counted from 1. It is ignored for files with frames beyond number 65535, which begin at 1.
+    /// Number of the first frame, counted from 1. It is ignored if a frame would have a number above 65535; the frames are then counted
+    /// from 1.
     pub first_frame: u32,
-    /// Size of a step of a residual, in the unit of the file; a residual has at most 255 steps.
+    /// Unit in which residuals are stored, in the unit of the file. A residual is a whole number of these steps, at most 255.
     pub residual_step: f64,
     /// Name and version of the program that writes the file.
     pub software: [&'a str; 2],
@@ -111,7 +112,7 @@ fn refused(why: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, format!("C3D: {why}"))
 }
 
-/// Returns the four reals of a point; the fourth contains cameras and residual.
+/// Returns the four reals of a point; the fourth contains the cameras and the residual.
 fn numbers(point: Option<&Marker>, step: f64) -> [u8; 16] {
     let values = point.map_or([0.0, 0.0, 0.0, -1.0], |point| {
         let [x, y, z] = point.position.map(|value| value as f32);
@@ -257,7 +258,7 @@ fn section(heading: &Heading<'_>, data_block: u16) -> Vec<u8> {
     all.real("SCALE", -heading.residual_step);
     all.real("RATE", heading.rate_hz);
     all.word("DATA_START", data_block);
-    // Some readers require a whole number here; longer files have their number in LONG_FRAMES and in TRIAL.
+    // Some readers require a 16-bit whole number here. Files with more frames have the number of frames in LONG_FRAMES and in TRIAL.
     all.word("FRAMES", clamped(heading.n_frames));
     if heading.n_frames > u32::from(u16::MAX) {
         all.real("LONG_FRAMES", f64::from(heading.n_frames));

@@ -2,8 +2,8 @@
 
 /// Computes the 64-bit FNV-1a hash.
 ///
-/// The hash distinguishes files and settings; it does not protect against forgery. Every step is a bijection of the state, so two inputs of
-/// the same length that differ in one byte never have the same hash.
+/// The hash is used to tell files and settings apart; it does not protect against forgery. Every step is a bijection of the state, so two
+/// inputs of the same length that differ in one byte never have the same hash.
 ///
 /// ```
 /// assert_eq!(formats::checksum::fnv1a(b"foobar"), 0x8594_4171_f739_67e8);

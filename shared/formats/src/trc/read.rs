@@ -1,4 +1,4 @@
-//! Parser from the text of a file to markers over time.
+//! Parser that converts the text of a file to markers over time.
 
 /// Markers over time.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Writer from markers over time to the text of a file, row by row.
+//! Writer that converts markers over time to the text of a file, row by row.
 
 use core::fmt::{self, Write as _};
 

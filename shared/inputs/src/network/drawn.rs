@@ -1,4 +1,4 @@
-//! Output of a network, drawn as a picture.
+//! Drawings of the output of a network.
 
 use footage::{Canvas, Limb, Side, Size, Tile, compose, draw_limbs};
 use keypoints::Keypoint;

@@ -3,7 +3,7 @@
 use inference::{Description, Port, Side};
 use keypoints::{Boxes, Card, Codec, DetectorCard, Input, Layout, SHIPPED, SHIPPED_DETECTORS};
 
-/// Returns the cards of `configs/networks` that agree best with the inputs and outputs of a network, judged by sizes and names. Returns
+/// Returns the cards in `configs/networks` that agree best with the inputs and outputs of a network, according to sizes and names. Returns
 /// several cards if they agree equally well, and no card if none agrees.
 pub fn nearest(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED.iter().filter_map(|(name, text)| {
@@ -14,7 +14,7 @@ pub fn nearest(description: &Description) -> Vec<&'static str> {
     best(&rated.collect::<Vec<_>>())
 }
 
-/// Works like [`nearest`] for the cards of `configs/detectors` whose input and output can match the network.
+/// Works like [`nearest`], but for the cards in `configs/detectors` whose input and output can match the network.
 pub fn nearest_detectors(description: &Description) -> Vec<&'static str> {
     let rated = SHIPPED_DETECTORS.iter().filter_map(|(name, text)| {
         let card = DetectorCard::parse(text).ok()?;
@@ -35,7 +35,7 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
     let input = of_input(&card.input, description);
     let outputs = description.outputs.iter();
     let output = match &card.output {
-        // The cells are those of the network's own input, which may be larger than the card's.
+        // The cells are counted for the network's own input, which may be larger than the input on the card.
         Boxes::Yolox {
             person, strides, ..
         } => {
@@ -50,7 +50,7 @@ fn points_of_detector(card: &DetectorCard, description: &Description) -> Option<
             };
             outputs.filter(|output| many(output)).map(|_| 2).max()
         }
-        // Files of this kind contain their card.
+        // Detectors of this kind contain their card in the ONNX file.
         Boxes::Centres { .. } => None,
         Boxes::List { boxes } => {
             let five = |port: &Port| match &port.sides[..] {
@@ -83,8 +83,8 @@ fn of_input(card: &Input, description: &Description) -> Option<usize> {
     inputs.filter_map(|input| agreeing(input, &sides)).max()
 }
 
-/// Returns a score for the agreement of a card; `None` if no output is of its kind. The kind of output counts most, then the number of
-/// keypoints, then the order of axes, then sides and names.
+/// Returns a score for the agreement of a card; `None` if no output is of the kind that the card describes. The kind of output has the most
+/// weight, then the number of keypoints, then the order of axes, then sides and names.
 fn points(card: &Card, description: &Description) -> Option<usize> {
     let [width, height] = [card.input.width, card.input.height];
     let outputs = || description.outputs.iter();
@@ -164,7 +164,7 @@ fn of_maps(output: &Port, n: usize, further: usize, layout: Layout) -> Option<us
     rated.max()
 }
 
-/// Returns the number of sides with these exact values, if no side contradicts them.
+/// Returns the number of sides that have exactly the given sizes; `None` if a side has a different size.
 fn agreeing(port: &Port, sides: &[usize]) -> Option<usize> {
     let fits = port.sides.len() == sides.len()
         && port.sides.iter().zip(sides).all(|(side, n)| side.may_be(*n));

@@ -124,7 +124,7 @@ fn the_nearest_card_has_the_networks_sides() {
         near(&[1, 256, 256, 3], &[("y", &[1, 195])]),
         ["blazepose-landmarks"]
     );
-    // Maps of LSP's 14 joints and of the background match in either order of axes, but never a card of lists.
+    // Maps of LSP's 14 joints and of the background match cards with either order of axes, but never a card for a list of positions.
     for (input, output) in [
         ([1, 3, 368, 368], [1, 15, 46, 46]),
         ([1, 368, 368, 3], [1, 46, 46, 15]),
@@ -180,7 +180,7 @@ fn the_nearest_card_of_a_detector_has_its_kind_of_output() {
         net.node("Relu", &["boxes"], "dets", vec![]);
         nearest_detectors(Session::parse(net.file()).unwrap().description())
     };
-    // The grids have 8x8, 4x4 and 2x2 cells; the card's own input is larger.
+    // The grids have 8x8, 4x4 and 2x2 cells; the input on the card is larger.
     assert_eq!(near(64, [1, 84, 85]), ["yolox"]);
     assert!(near(96, [1, 84, 85]).is_empty());
     assert_eq!(near(320, [1, 100, 5]), ["rtmdet-person"]);

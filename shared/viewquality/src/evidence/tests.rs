@@ -101,7 +101,7 @@ fn spring_and_bias_scores_are_those_of_the_model() {
     // Displacement: parent (5, 4) + anchor (1, 2) - child (8, 9) = (-2, -3).
     let expected = -(0.01 * 4.0 - 0.1 * 2.0 + 0.02 * 9.0 - 0.2 * 3.0);
     assert!((at("part 2 spring") - expected).abs() < 1e-6);
-    // The other child is at (0, 0), displaced by the anchor alone.
+    // The displacement of the other child equals its anchor, (1, 2).
     let other = -(0.01 + 0.1 + 0.02 * 4.0 + 0.2 * 2.0);
     assert!((at("springs") - at("part 2 spring") - other).abs() < 1e-6);
     assert_eq!(at("part 1 spring"), 0.0);
@@ -118,7 +118,7 @@ fn types_and_scores_are_those_of_the_pose() {
     let local = ["response", "contrast", "margin"].map(|name| at(&format!("part 2 {name}")));
     assert_eq!(local, [0.5, -1.0, 0.25]);
     assert_eq!((at("score"), at("responses")), (2.0, 5.5));
-    // The box has three cells of four pixels.
+    // A part's box is three cells of four pixels wide.
     assert!((at("log_box_side") - 12.0_f32.ln()).abs() < 1e-6);
 }
 

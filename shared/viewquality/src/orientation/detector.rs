@@ -1,4 +1,4 @@
-//! The evidence for a pose of a frame.
+//! The evidence from the picture about the direction in which a person faces.
 
 use crate::Sampler;
 use kernels::Rgb8View;
@@ -22,9 +22,8 @@ pub struct Workspace {
     features: Vec<f32>,
 }
 
-/// The midpoint between head and neck, `[x, y]` in the unit of the parts. They are parts 0 and 1 of the published model.
-///
-/// * Returns `None` for a model whose number of parts is not 26, as in the published model.
+/// The midpoint between head and neck, `[x, y]` in the unit of the parts. Head and neck are parts 0 and 1 of the published model. * Returns
+/// `None` for a model that does not have the 26 parts of the published model.
 pub fn head_of(parts: &[[f64; 2]]) -> Option<[f64; 2]> {
     const N_PARTS: usize = 26;
     let ([head, neck, ..], N_PARTS) = (parts, parts.len()) else {
@@ -39,7 +38,7 @@ impl Detector {
         Self { network }
     }
 
-    /// Returns the picture's evidence about the person of a pose.
+    /// Returns the evidence from the picture about the direction in which the person of a pose faces.
     ///
     /// * `bounds`: the pose's box in the frame, `[x1, y1, x2, y2]` in pixels.
     /// * `head`: the midpoint between head and neck in the frame, `[x, y]` in pixels.
@@ -57,7 +56,7 @@ impl Detector {
         }
     }
 
-    /// Returns the evidence of a tile: the mean over the tile and its mirror image.
+    /// Returns the evidence from a tile: the mean over the tile and its mirror image.
     pub fn of_tile(&self, tile: &Tile, workspace: &mut Workspace) -> FrontEvidence {
         let mut look = |mirrored: bool| {
             let crop = Crop {

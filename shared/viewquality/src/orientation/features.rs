@@ -6,7 +6,7 @@ use crate::orientation::tile::{Crop, Tile};
 
 /// A square patch.
 struct Patch {
-    /// Distance of the patch's centre below the head's, in pixels of the tile.
+    /// Vertical distance by which the centre of the patch is below the head's centre, in pixels of the tile.
     below: f32,
     /// Side of the patch, in pixels of the patch.
     side: usize,
@@ -16,8 +16,8 @@ struct Patch {
     cell: usize,
 }
 
-/// Patches for the head with the shoulders, for the face, and for the upper part of the body. They were chosen among eight sets by the
-/// results on held-out people of `LSP-extended`. Patches of whole bodies and of feet did not help.
+/// Patches for the head with the shoulders, for the face, and for the upper part of the body. This set was chosen from eight sets by the
+/// results for held-out people of `LSP-extended`. Patches of whole bodies and of feet did not help.
 const PATCHES: [Patch; 3] = [
     Patch {
         below: 0.0,
@@ -95,7 +95,7 @@ fn gradients(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     let side = patch.side;
     let before = out.len();
     out.resize(before + patch.n_gradients(), 0.0);
-    // The patch has the size of the view, so this cannot fail.
+    // The buffer has the size of the patch, so this cannot fail.
     if let Ok(view) = Rgb8View::new(side, side, &buffers.patch) {
         let planes = &mut buffers.planes;
         resize(isa, view, [side; 2], &mut buffers.shrink, planes);
@@ -109,7 +109,7 @@ fn gradients(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     }
 }
 
-/// Brightness of every cell relative to that of the patch, and the red and blue components of its colour.
+/// For every cell, the brightness relative to the brightness of the patch, and the red and blue components of the colour.
 fn colours(patch: &Patch, buffers: &mut Buffers, out: &mut Vec<f32>) {
     let (side, cell, n) = (patch.side, patch.cell, patch.n_cells());
     buffers.means.clear();

@@ -32,7 +32,7 @@ pub enum FileError {
     /// The file has a different kind or version, or is damaged.
     #[error(transparent)]
     Envelope(#[from] EnvelopeError),
-    /// The network was made for different features.
+    /// The network was trained with different features.
     #[error("the network takes {got} features, but this Parallax computes {expected}")]
     Features {
         /// Number of features in the file.

@@ -81,7 +81,7 @@ impl Network {
     }
 }
 
-/// The scalar product, computed in the same order on every machine.
+/// The scalar product, summed in the same order on every machine.
 pub(crate) fn dot(a: &[f32], b: &[f32]) -> f32 {
     const LANES: usize = 16;
     let mut sums = [0.0_f32; LANES];

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 use crate::orientation::detector::{Detector, Workspace};
 use crate::orientation::train::Sample;
 
-/// How often a detector distinguishes a direction from its opposite.
+/// Measures how reliably a detector distinguishes a direction from the opposite one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Score {
     /// Number of people.
     pub n: usize,
-    /// Number of people whose true direction is rated as the more likely one.
+    /// Number of people whose true direction is rated as more likely than the opposite one.
     pub n_right: usize,
-    /// Mean negative log-likelihood in nats; `ln 2` for a detector without information.
+    /// Mean negative log-likelihood in nats; `ln 2` for a detector that only guesses.
     pub surprise: f64,
 }
 

@@ -9,7 +9,7 @@ pub const TILE: TileShape = TileShape {
     width: 128,
 };
 
-/// The part of [`TILE`] that the box of the pose fills, up to a margin.
+/// Size of the part of [`TILE`] that shows the box of the pose with a margin.
 const BOX: TileShape = TileShape {
     height: 160,
     width: 96,

@@ -16,7 +16,8 @@ pub struct Sample {
     /// The direction in which the person faces: components towards the right of the picture and towards the camera. Its length is at
     /// most 1.
     pub front: [f32; 2],
-    /// True for a photograph. Photographs of people seen from behind are weighted to count as much in total as all other photographs.
+    /// True for a photograph. Photographs of people seen from behind get a weight with which they count as much in total as all other
+    /// photographs.
     pub is_photograph: bool,
 }
 
@@ -61,7 +62,7 @@ pub struct Pass {
     pub loss: f64,
 }
 
-/// Shares of the features, and of the hidden units, that are left out of a step at random.
+/// Share of the features, and share of the hidden units, that are randomly left out in each step (dropout).
 const FEATURES_OUT: f32 = 0.15;
 const UNITS_OUT: f32 = 0.5;
 /// Minimum standard deviation by which a feature is divided.
@@ -170,7 +171,7 @@ fn beginning(samples: &[Sample], settings: &Settings, rng: &mut Rng) -> Network 
     }
 }
 
-/// A random crop, within the variation of boxes, lighting and people.
+/// A random crop. It varies as much as boxes, lighting and people usually do.
 fn vary(rng: &mut Rng) -> Crop {
     let mut within = |most: f32| most * (2.0 * rng.f32() - 1.0);
     let bright = 1.0 + within(0.35);
@@ -243,7 +244,7 @@ impl Trainer {
         loss
     }
 
-    /// Changes all parameters against their derivatives.
+    /// Changes all parameters in the direction opposite to their derivatives.
     fn go(
         &mut self,
         rate: f32,
@@ -300,7 +301,7 @@ mod tests {
     use super::*;
     use crate::orientation::{Detector, score};
 
-    /// People whose faces are bright on the side to which they look, and dark from behind.
+    /// Artificial people: their faces are bright on the side towards which they look, and dark from behind.
     fn made_up(n: u64, seed: u64) -> Vec<Sample> {
         let mut rng = Rng::with_seed(seed);
         let one = |_| {

@@ -4,13 +4,13 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A normalisation that keeps colours from 0 to 255.
+/// A normalisation that leaves colours in the range from 0 to 255.
 const PLAIN: Normalisation = Normalisation {
     mean: [0.0; 3],
     deviation: [1.0 / 255.0; 3],
 };
 
-/// Rounds away the error of the normalisation.
+/// Rounds colours, to remove the rounding error of the normalisation.
 fn colours(values: &[f32]) -> Vec<f32> {
     values.iter().map(|value| (value * 1e4).round() / 1e4).collect()
 }
@@ -134,7 +134,7 @@ fn colours_are_normalised() {
     assert_eq!(out, [1.0, -2.0, 0.2]);
 }
 
-/// The same sum as a single formula, in f64.
+/// The weighted mean of the frame's pixels, computed as a single formula in f64.
 fn reference(size: [usize; 2], data: &[u8], tile: &Tile, [row, col, channel]: [usize; 3]) -> f64 {
     let reach = tile.scale.max(1.0);
     let TileShape { height, width } = tile.shape;
