@@ -159,7 +159,7 @@ pub fn variable(bytes: &[u8]) -> Result<(String, Value<'_>), ContainerError> {
 }
 
 const HEADER_BYTES: usize = 128;
-/// Limit for the number of bytes. The largest accepted model needs less, at 4 bytes per weight.
+/// Maximum total size of the decompressed variables, in bytes. The largest accepted model needs less, at 4 bytes per weight.
 const MAX_BYTES: usize = 64 << 20;
 const MAX_VALUES: usize = 1 << 20;
 const MAX_DEPTH: usize = 8;
