@@ -11,8 +11,8 @@ use crate::Folder;
 /// content, even after a loss of power.
 ///
 /// The data is written to `.name.<process id>.part` in the same folder, flushed to the disk, and renamed. If the process is killed, at most
-/// this temporary file remains. The permissions are those of a new file, regardless of the old ones. Links are followed only in the path of
-/// the file's folder.
+/// this temporary file remains. The file gets the permissions of a new file, whatever permissions the old file had. Links are followed only
+/// in the path of the file's folder.
 ///
 /// # Errors
 ///

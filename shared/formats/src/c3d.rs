@@ -1,8 +1,8 @@
 //! Reading of points over time from C3D files in all six encodings (Intel, DEC and MIPS numbers, as integers or reals), and writing of
 //! files as Intel reals ([`write()`]).
 //!
-//! This crate has its own reader because published ones reject many old files from laboratories, although these files contain all the data
-//! needed. For example, they lack `POINT:UNITS` or `ANALOG:RATE`, or store an offset as a real. Analog samples are skipped. Memory is
+//! This crate has its own reader because published readers reject many old files from laboratories, although these files contain all the
+//! data needed. For example, they lack `POINT:UNITS` or `ANALOG:RATE`, or store an offset as a real. Analog samples are skipped. Memory is
 //! allocated only for data that is in the file, never for a declared count. The format is described in *The C3D File Format* (c3d.org).
 //!
 //! ```

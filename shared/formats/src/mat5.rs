@@ -1,7 +1,7 @@
 //! Reader of MATLAB level 5 files: numbers, structs and cells, compressed or not, as needed for models and annotations.
 //!
-//! This crate has its own reader because published ones panic on damaged files. Memory is never allocated for a declared count: every array
-//! borrows bytes of the file.
+//! This crate has its own reader because published readers panic on damaged files. Memory is never allocated for a declared count: every
+//! array borrows bytes of the file.
 //!
 //! ```
 //! let file = include_bytes!("../examples/points.mat");

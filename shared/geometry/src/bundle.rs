@@ -10,7 +10,7 @@
 //! | cameras of a problem, with free or fixed poses, focal lengths, centres and lenses | [`Cameras`], [`Free`] |
 //! | minimisation of the cost, by the Levenberg-Marquardt method | [`solve`], [`Settings`], [`Report`] |
 //! | uncertainty of the shared parameters, and parameters that are not determined | [`covariance`], [`clustered`], [`Undetermined`] |
-//! | comparison of derivatives with numeric ones, for tests | [`derivative_error`] |
+//! | comparison of derivatives with numeric derivatives, for tests | [`derivative_error`] |
 //!
 //! Values that are fixed, such as the pose of the first camera (the gauge), are not parameters. A term without a local block fixes the
 //! scale ([`Problem::priors`]). The functions are pure: the same input gives the same result, bit for bit.

@@ -12,8 +12,8 @@ pub enum LensModel {
     #[default]
     Pinhole,
     /// Rational radial and tangential distortion of the normalised point (x, y), with r² = x² + y²: `x (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 +
-    /// k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²)`. The formula for y is the same with p1 and p2 exchanged. `OpenCV` lists the
-    /// coefficients as k1 k2 p1 p2 k3 k4 k5 k6.
+    /// k4 r² + k5 r⁴ + k6 r⁶) + 2 p1 x y + p2 (r² + 2 x²)`. The formula for y is the same with x and y, and p1 and p2, swapped. `OpenCV`
+    /// lists the coefficients as k1 k2 p1 p2 k3 k4 k5 k6.
     BrownConrady {
         /// Radial coefficients k1 to k6; k4 to k6 are in the denominator.
         k: [f64; 6],

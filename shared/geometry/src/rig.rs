@@ -91,7 +91,7 @@ pub enum RigError {
         /// Maximum focal length, as a multiple of the extent.
         limit: f64,
     },
-    /// A lens coefficient is larger than that of any real lens.
+    /// A lens coefficient is larger than in any real lens.
     #[error(
         "camera {camera:?}: a lens coefficient is {value:e}, but the limit is {limit:e}: are the coefficients in the order of the format?"
     )]

@@ -72,7 +72,7 @@ pub struct Suspect {
     pub view: usize,
     /// Residual of the camera groups that contain this camera, in pixels.
     pub residual_px: f64,
-    /// Residual of the camera groups that do not contain it, in pixels.
+    /// Residual of the camera groups that do not contain this camera, in pixels.
     pub without_px: f64,
 }
 

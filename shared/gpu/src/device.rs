@@ -117,7 +117,7 @@ impl Device {
         &self.adapter
     }
 
-    /// Gives up the device: every later search reports that it is lost.
+    /// Gives up the device. Every later search fails with [`DeviceLost`].
     pub fn destroy(&self) {
         self.is_lost.store(true, Ordering::Relaxed);
         self.raw.destroy();

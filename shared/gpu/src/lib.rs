@@ -47,7 +47,7 @@ pub use open::adapters;
 #[cfg(feature = "gpu")]
 pub use view::View;
 
-/// True if this build can use a GPU.
+/// True if this build supports GPUs.
 pub const IS_BUILT: bool = cfg!(feature = "gpu");
 
 /// The result of a search.

@@ -158,7 +158,7 @@ pub fn camera_of<'a>(
 ///
 /// # Errors
 ///
-/// Fails if a file cannot be read, if its part types are not those of the model, or if the two contradict each other.
+/// Fails if a file cannot be read, if its part types differ from the types in the model, or if the two tables contradict each other.
 fn type_tables(files: [&Path; 2], model: &Model) -> Result<TypeTables, Failure> {
     let n_types: Vec<usize> = (0..model.n_parts()).map(|part| model.n_types(part)).collect();
     let read = |file: &Path| -> Result<Compatibility, Failure> {

@@ -38,7 +38,7 @@ impl Isa {
         Self(Kind::Portable)
     }
 
-    /// Returns true for [`Self::Portable`] instructions, which every machine has.
+    /// Returns true if these are only the instructions that the compilation target guarantees, which every machine has.
     pub fn is_portable(self) -> bool {
         self.0 == Kind::Portable
     }

@@ -18,7 +18,7 @@ const MOST_MORE: usize = 2;
 pub struct Looker<'a> {
     /// The network.
     pub network: &'a PoseNetwork,
-    /// Settings that turn maps into evidence.
+    /// Settings for the conversion of maps to evidence.
     pub settings: &'a MapSettings,
 }
 

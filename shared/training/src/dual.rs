@@ -1,9 +1,10 @@
 //! The structural support vector machine, solved by dual coordinate descent over the working set of examples.
 //!
 //! Primal: `min_v 1/2 |v|^2 + sum_g C_g max(0, max_{j in g} (b_j - v . x_j))`, where some coordinates of `v` must not be negative. Each
-//! example `j` belongs to a group `g`: one person, or one position in a negative image. Only the worst example of a group counts. Dual:
-//! `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`, `sum_{j in g} a_j <= C_g`, and `v(a) = [sum_j a_j x_j]` where negative values of
-//! those coordinates are set to 0. Source: Yang & Ramanan 2013, section 5, and what is known about the solver in the authors' release.
+//! example `j` belongs to a group `g`: one person, or one position in a negative image. Only the worst example of a group counts. The
+//! factor `a_j` is called the share of example `j` in the solution. Dual: `max_a sum_j a_j b_j - 1/2 |v(a)|^2` with `a_j >= 0`, `sum_{j in
+//! g} a_j <= C_g`, and `v(a) = [sum_j a_j x_j]` where negative values of those coordinates are set to 0. Source: Yang & Ramanan 2013,
+//! section 5, and the known properties of the solver in the authors' release.
 
 mod solve;
 #[cfg(test)]

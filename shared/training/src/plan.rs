@@ -79,7 +79,7 @@ pub enum PlanError {
 }
 
 impl Plan {
-    /// Estimates the sizes of the people, drops those smaller than the filters, and clusters the parts.
+    /// Estimates the sizes of the people, leaves out people who are smaller than the filters, and clusters the parts.
     ///
     /// * `people`: centres of the parts of every person in the album, in pixels of the image.
     ///

@@ -54,7 +54,7 @@ impl Symmetry {
         Some(Self { mirrored })
     }
 
-    /// The mean of a vector and its mirror image.
+    /// Returns the mean of a parameter vector and its mirror image.
     pub(crate) fn balance(&self, v: &[f64]) -> Vec<f64> {
         let theirs = self.mirrored.iter().map(|&(at, sign)| sign * v[at as usize]);
         v.iter().zip(theirs).map(|(own, theirs)| 0.5 * (own + theirs)).collect()

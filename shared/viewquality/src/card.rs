@@ -85,7 +85,7 @@ impl Unit {
     }
 }
 
-/// The description of a network besides its graph.
+/// The description of a network that is stored in its file in addition to the graph.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Card {
     /// Size of the tile; if `None`, the size of the network's input.

@@ -222,7 +222,7 @@ fn length(name: &'static str, values: &[f32], expected: usize) -> Result<(), Net
     Ok(())
 }
 
-/// Height and width of the tile, from the card or else from the input.
+/// Height and width of the tile, from the card or, if the card does not give them, from the input.
 ///
 /// * `sides`: sides of the input; empty if the file does not declare them.
 fn tile_shape(sides: &[Side], card: &Card) -> Result<TileShape, NetworkError> {

@@ -6,7 +6,7 @@ use crate::Table;
 
 /// Selects the sequence of a table that corresponds to a deployment, and converts frame numbers.
 ///
-/// By default the frame numbers of the table are those of the deployment.
+/// By default, the table and the deployment use the same frame numbers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Selection {
     /// Subject in the table; empty if the table has no subjects.

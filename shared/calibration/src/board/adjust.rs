@@ -137,7 +137,7 @@ fn limits(solved: &BoardProblem<'_>, n_cameras: usize) -> Vec<f64> {
     lengths.into_iter().map(limit).collect()
 }
 
-/// Returns true for every corner of every frame that is within the limits.
+/// For every corner of every frame, returns true if its residual is within the limits.
 fn right(solved: &BoardProblem<'_>, limits: &[f64]) -> Vec<Vec<bool>> {
     let of_frame = |(frame, seen): (usize, &Vec<Observation>)| {
         let each = solved.residuals(frame).into_iter().zip(seen);

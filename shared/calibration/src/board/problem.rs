@@ -140,7 +140,8 @@ fn prior(camera: &Camera, name: &str) -> Option<(f64, f64)> {
                 _ if is_fisheye => RADIAL,
                 6.. => TANGENTIAL,
                 3..=5 => DIVIDING,
-                // In a model with a divisor, coefficients in the numerator and denominator can grow together.
+                // In a rational lens model, coefficients of the numerator and the denominator can grow together with hardly any effect on
+                // the distortion.
                 _ if camera
                     .intrinsics
                     .lens

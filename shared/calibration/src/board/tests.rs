@@ -333,7 +333,7 @@ fn a_board_with_two_sides_tells_how_opposite_cameras_stand() {
 struct Carried<'a> {
     truth: &'a [Camera],
     board: &'a [Point2<f64>],
-    /// Number of frames for which the board is held still at every place.
+    /// Number of frames in which the board is held still at every place.
     n_held: usize,
     /// Step between frames that are used.
     every: usize,

@@ -7,7 +7,7 @@ use statistics::Sorted;
 
 use crate::align::{Similarity, aligned};
 
-/// Speed below which a foot counts as standing, in metres per second. The speed is that of the ankle.
+/// A foot counts as standing if the speed of its ankle is below this, in metres per second.
 const STANDING_M_S: f64 = 0.25;
 /// Conditions for a plane through standing feet to be the floor, in metres: the minimum distance between the feet, and their largest
 /// deviation from the plane.

@@ -115,7 +115,7 @@ fn of_point(camera: &Camera, point: &Point3<f64>, both: [Sight; 2]) -> Option<[f
     Some(both.map(|sight| (sight.at - image).norm()))
 }
 
-/// Returns the distances from the epipolar line, in pixels of the second camera.
+/// Returns the distances of joints from their epipolar lines, in pixels of the second camera.
 pub(crate) fn of_pair(
     cameras: &[Camera],
     [a, b]: [usize; 2],

@@ -1,4 +1,4 @@
-//! Comparison of a problem's derivatives with numeric ones.
+//! Comparison of a problem's derivatives with numeric derivatives.
 
 use super::{Problem, Step, Term};
 

@@ -1,4 +1,4 @@
-//! Tests that distorting and undistorting are inverse within the valid range of a lens, and refused outside it.
+//! Tests that distorting and undistorting are inverse to each other within the valid range of a lens, and give no result outside it.
 
 use proptest::prelude::*;
 

@@ -145,7 +145,7 @@ impl SwapWatch {
         })
     }
 
-    /// Returns all pairs with at least `n_frames` frames, those that fit best when swapped first.
+    /// Returns all pairs with at least `n_frames` frames. The pair that fits best when swapped comes first.
     pub(super) fn best(&self, n_frames: usize) -> Vec<Swap> {
         let usable = self.tried.iter().filter(|(_, frames)| frames.len() >= n_frames);
         let mut all: Vec<Swap> = usable
@@ -163,7 +163,8 @@ impl SwapWatch {
         all
     }
 
-    /// Returns `[view][camera][point]`: the ray of a view's observation, if its footage is that of a camera.
+    /// Returns `[view][camera][point]`: the ray of a view's observation, on the assumption that its footage was recorded by the given
+    /// camera.
     fn rays(&self, points_px: &[Option<Vec<[f64; 2]>>]) -> Vec<Vec<Vec<Option<Ray>>>> {
         let of_view = |(view, points): (usize, &Option<Vec<[f64; 2]>>)| {
             let points = points.as_deref().unwrap_or_default();
@@ -187,8 +188,8 @@ impl SwapWatch {
         at.iter().all(|value| value.is_finite()).then_some(at)
     }
 
-    /// Returns the angular residual in degrees if the footage of view `i` is that of camera `camera_of[i]`, with left and right swapped
-    /// where that fits better.
+    /// Returns the angular residual in degrees on the assumption that camera `camera_of[i]` recorded the footage of view `i`, with left and
+    /// right swapped where that fits better.
     fn residual_degrees(&self, rays: &[Vec<Vec<Option<Ray>>>], camera_of: &[usize]) -> Option<f64> {
         let mut is_mirrored = vec![false; rays.len()];
         let mut best = self.residual_mirrored(rays, camera_of, &is_mirrored)?;

@@ -206,8 +206,8 @@ impl<'a> Viewpoint<'a> {
         }
     }
 
-    /// Returns points on the camera's rays, from depths at which a person fills the image to those at which a person is small in it. Every
-    /// doubling of the depth has the same number of points.
+    /// Returns points on the camera's rays. The depths range from a person filling the image to a person who is small in it. Every doubling
+    /// of the depth has the same number of points.
     fn points(&self) -> impl Iterator<Item = Point3<f64>> + '_ {
         let [width, height] = self.camera.intrinsics.size.map(f64::from);
         let middle = |nth: usize, n: usize| (nth as f64 + 0.5) / n as f64;

@@ -8,7 +8,7 @@ use crate::simd::{Row, Simd};
 
 /// The operands of the sums: either a filter over the rows of a map, or transformed tiles with one product per channel.
 pub(super) struct Sums<'a, C> {
-    /// Cells, starting with the one under the first filter cell of the first sum.
+    /// Cells, starting with the cell under the first filter cell of the first sum.
     pub(super) cells: &'a [C],
     /// Number of cells from one row of the map to the next.
     pub(super) stride: usize,

@@ -50,7 +50,7 @@ impl Turn {
         all.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(self)
     }
 
-    /// Returns true if the rotation exchanges columns and rows.
+    /// Returns true if the rotation swaps columns and rows.
     pub(super) fn is_sideways(self) -> bool {
         matches!(self, Self::Right | Self::Left)
     }

@@ -154,7 +154,7 @@ impl Fault {
     }
 }
 
-/// Kinds of [`Fault`], used to count faults and to choose the fatal ones.
+/// Kinds of [`Fault`]. They are used to count faults, and to choose the faults that make reading fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FaultKind {
     /// [`Fault::Syntax`]

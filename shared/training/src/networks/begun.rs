@@ -33,7 +33,7 @@ pub enum BeginError {
         /// Expected dimensions.
         expected: Vec<usize>,
     },
-    /// A constant has a value that is not finite, the wrong number of bytes, or another type.
+    /// A constant has a value that is not finite, the wrong number of bytes, or an unexpected type.
     #[error("its {name} does not consist of {n} finite numbers of half or single precision")]
     Numbers {
         /// Name of the layer, with the role of its values.

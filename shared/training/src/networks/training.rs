@@ -48,7 +48,7 @@ pub trait Kept: Copy + Debug + PartialEq + Serialize + DeserializeOwned {}
 
 impl<T: Copy + Debug + PartialEq + Serialize + DeserializeOwned> Kept for T {}
 
-/// Samples, truth, cost and steps of a training run: everything that differs between training tasks.
+/// Samples, true outputs, cost and steps of a training run: everything that differs between training tasks.
 ///
 /// All data of a step depend only on the number of the step.
 pub trait Task: Sync {

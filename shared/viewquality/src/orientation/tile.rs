@@ -124,7 +124,7 @@ impl Tile {
 /// Variation of a tile: none in the detector, random in training.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crop {
-    /// True if left and right are exchanged.
+    /// True if left and right are swapped.
     pub mirrored: bool,
     /// Factor of the patches' size.
     pub scale: f32,

@@ -15,7 +15,7 @@ const NO_RIVAL: f64 = 0.3;
 const LEAST_T: f64 = 4.0;
 /// Largest standard error of an offset, in seconds and in intervals between pictures.
 const MOST_ERROR: [f64; 2] = [0.006, 0.2];
-/// Minimum decrease of the cost at the best offset relative to the mean, as a fraction.
+/// Minimum decrease of the cost at the best offset, relative to the mean cost of all offsets, as a fraction.
 const LEAST_GAIN: f64 = 0.08;
 /// Largest median residual, in expected errors.
 const MOST_RESIDUAL: f64 = 3.0;

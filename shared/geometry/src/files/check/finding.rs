@@ -56,7 +56,7 @@ pub enum Finding {
         /// Ratio fy / fx.
         ratio: f64,
     },
-    /// The field of view is not that of a usual lens, perhaps because the image size was changed after calibration.
+    /// No usual lens has this field of view, perhaps because the image size was changed after calibration.
     FieldOfView {
         /// Name of the camera.
         camera: String,

@@ -5,7 +5,7 @@ use nalgebra::Rotation3;
 use super::*;
 use crate::{Framing, OutSize};
 
-/// Number of points of one side; head and neck precede both sides.
+/// Number of points on each side of the body. The points of the head and the neck come before those of both sides.
 const SIDE: usize = 12;
 const N: usize = 2 + 2 * SIDE;
 /// Number of points of an arm. They are the first points of a side.

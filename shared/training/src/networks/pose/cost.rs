@@ -1,4 +1,4 @@
-//! The cost of the network's output compared with the truth, and its gradients.
+//! The cost of the difference between the network's output and the true output, and its gradients.
 
 use serde::{Deserialize, Serialize};
 

@@ -3,8 +3,8 @@
 //! The input is a picture of one person. There are three outputs: a map of log-odds for every keypoint, the evidence for the
 //! direction in which the trunk faces, and the expected error of every keypoint.
 //!
-//! The maps of the [extra keypoints](EXTRAS) have a small head of their own over the features of the joints. This head can be
-//! trained alone.
+//! The maps of the [extra keypoints](EXTRAS) are computed from the same features as the joints, by a few separate layers. These layers can
+//! be trained alone.
 
 use skeleton::PARSE14;
 
@@ -76,7 +76,7 @@ impl Default for Shape {
 }
 
 impl Shape {
-    /// The same network for an input that is 32 pixels smaller across and down, if it is large enough.
+    /// The same network for an input that is 32 pixels smaller across and down, if the input is large enough for that.
     #[must_use]
     pub fn smaller(&self) -> Self {
         let less = |side: usize| side.saturating_sub(MULTIPLE).max(MULTIPLE);

@@ -21,7 +21,7 @@ const STICKS: [(&[usize], &[usize]); 10] = [
 /// Indices of the neck and the top of the head.
 const HEAD: [usize; 2] = [12, 13];
 
-/// Found keypoints of one person, and the true ones.
+/// Found and true keypoints of one person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
     /// Positions of the found keypoints, in cells.

@@ -1,4 +1,4 @@
-//! Evaluates predicted errors against true ones, part by part.
+//! Evaluates predicted errors by comparing them with the true errors, part by part.
 
 use skeleton::N_PARTS;
 use statistics::Sorted;

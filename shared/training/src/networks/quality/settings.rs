@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::network::{Kind, Shape};
 use crate::networks::settings::{SettingsError, check, count, from_zero};
 
-/// The loss of the difference between prediction and truth.
+/// Loss function for the difference between a predicted and a true error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Loss {
@@ -101,7 +101,7 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {
-    /// Share of samples that are mirrored, with left and right exchanged.
+    /// Share of samples that are mirrored, with left and right swapped.
     pub mirror: f32,
     /// Largest shift of the tile, in heights of the tile.
     pub shift: f32,

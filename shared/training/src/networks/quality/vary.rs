@@ -18,7 +18,7 @@ pub struct NetworkSample {
     pub evidence: Vec<f32>,
     /// Height of the area that the tile shows, in pixels of the picture.
     pub height_px: f32,
-    /// Distance of every part from the truth, in pixels of the picture.
+    /// Distance of every part from its true position, in pixels of the picture.
     pub errors_px: Vec<f32>,
 }
 
