@@ -77,7 +77,7 @@ impl Sight {
         each.map(|(on_board, (_, at))| (*on_board, *at)).collect()
     }
 
-    /// Returns the same sight with different corner numbers.
+    /// Returns the same corners with different numbers.
     fn renumbered(&self, numbers: &[usize], board: &[Point2<f64>]) -> Self {
         let points = self.points.iter().map(|(id, at)| (numbers[*id], *at));
         Self::new(self.camera, self.frame, points, board)

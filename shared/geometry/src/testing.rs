@@ -66,7 +66,7 @@ pub(crate) fn looking_at_origin(
 ) -> Isometry3<f64> {
     let eye = Point3::new(distance * bearing.cos(), distance * bearing.sin(), height);
     let upright = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
-    // `look_at_rh` has x right, y up and z backward; half a turn about x converts it to the convention of `OpenCV`.
+    // `look_at_rh` has x right, y up and z backward; a rotation by 180 degrees about x converts it to the convention of `OpenCV`.
     let opencv = Isometry3::rotation(Vector3::x() * std::f64::consts::PI);
     Isometry3::rotation(Vector3::z() * roll) * opencv * upright
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
 /// * `up`: up direction (opposite to gravity) in the world.
 pub fn z_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
     Rotation3::rotation_between(up, &Vector3::z_axis())
-        // There is no unique smallest rotation for straight down, so half a turn about x is used.
+        // If z points straight down, there is no unique smallest rotation, so a rotation by 180 degrees about x is used.
         .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI))
 }
 

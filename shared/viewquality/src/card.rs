@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::{EVIDENCE_VERSION, Normalisation, TileShape};
 
-/// Names of the entries.
+/// Names of the entries in the file's metadata.
 pub mod key {
     /// Version of these entries: `1`. All entries are optional; see [`Card`](super::Card).
     pub const VERSION: &str = "parallax.version";

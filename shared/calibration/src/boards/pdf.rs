@@ -1,4 +1,4 @@
-//! Output of a drawing as PDF: one page, filled rectangles, and a font that every reader has.
+//! Output of a drawing as PDF: one page, filled rectangles, and a font that every PDF reader has.
 
 use core::fmt::Write as _;
 

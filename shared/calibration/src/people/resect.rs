@@ -111,7 +111,7 @@ fn linear(camera: &Camera, sample: &[Known; 6]) -> Option<Isometry3<f64>> {
     translation.iter().all(|value| value.is_finite()).then_some(pose)
 }
 
-/// Problem with one camera and fixed joints.
+/// Adjustment problem with one camera and fixed positions of joints.
 #[derive(Clone)]
 struct Resection<'a> {
     cameras: Cameras,

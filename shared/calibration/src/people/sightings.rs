@@ -100,7 +100,7 @@ impl Chain {
         (can_be && may_be).then_some(gap)
     }
 
-    /// Returns true if a track begins near the end of the chain's last track.
+    /// Returns true if a track begins near the position at which the chain's last track ends.
     fn is_in_place(&self, track: &Track, n_joints: usize) -> bool {
         let Some(last) = self.tracks.last() else {
             return false;

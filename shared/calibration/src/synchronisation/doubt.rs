@@ -33,7 +33,7 @@ pub enum Doubt {
         ratio: f64,
         /// Largest accepted ratio.
         most_ratio: f64,
-        /// Difference between the two gains, in standard errors.
+        /// Difference between the two gains, in standard errors of this difference.
         t: f64,
         /// Smallest accepted difference, in standard errors.
         least_t: f64,

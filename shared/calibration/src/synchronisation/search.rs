@@ -13,7 +13,7 @@ const BLOCK_S: f64 = 0.5;
 /// Maximum number of cameras for which every division into two groups is tried.
 const MOST_DIVIDED: usize = 8;
 
-/// A division of the cameras into two groups. It compares the best offset between the groups with the second best.
+/// A division of the cameras into two groups, with a comparison of the best and the second-best offset between the groups.
 #[derive(Debug, Clone)]
 pub(crate) struct Rival {
     /// Cameras of the group without the reference.

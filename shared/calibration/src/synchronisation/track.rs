@@ -15,11 +15,11 @@ const OUTLIER: f64 = 0.03;
 const TURNING: f64 = 0.25;
 /// Number of neighbours in time on each side.
 const NEIGHBOURS: usize = 3;
-/// Minimum score of a joint.
+/// Minimum score, 0 to 1, of a joint that is used.
 const LEAST_SCORE: f64 = 0.05;
-/// Extent of the smoothing kernel, in standard deviations.
+/// Half the width of the smoothing kernel, in standard deviations.
 const KERNEL_END: f64 = 2.5;
-/// Minimum number of joints of a person.
+/// Minimum number of joints of a person who is followed.
 pub(crate) const LEAST_JOINTS: usize = 3;
 
 /// A joint at a time.
@@ -50,7 +50,7 @@ pub struct Track {
     pub(crate) size: f64,
     /// Samples of each joint, in order of time.
     joints: Vec<Vec<Sample>>,
-    /// Standard deviation of the kernel, in seconds.
+    /// Standard deviation of the smoothing kernel, in seconds.
     sigma_s: f64,
 }
 

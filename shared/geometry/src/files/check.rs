@@ -78,7 +78,7 @@ fn check_intrinsics(camera: &Camera, findings: &mut Vec<Finding>) {
     findings.extend(lens_range(camera).or_else(|| lens_strength(camera)));
 }
 
-/// Finds pixels without a ray, on a grid and in the corners.
+/// Finds pixels to which no ray belongs, on a grid and in the corners.
 fn lens_range(camera: &Camera) -> Option<Finding> {
     const STEPS: usize = 16;
     let [width, height] = camera.intrinsics.size.map(f64::from);

@@ -90,7 +90,8 @@ fn towards_the_right_is_towards_the_left_in_a_mirror() {
 #[test]
 fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
     let [plain, mirrored] = both(&pooled(), CARD);
-    // The first column has no partner. The partner of the second is the third of the mirror image, which is the first of the picture.
+    // The first column has no counterpart and stays as it is. The second column is averaged with the third of the mirror image, which is
+    // the first of the picture.
     for row in 0..12 {
         let [first, second, third] = [0, 1, 2].map(|i| plain[0][3 * row + i]);
         let expected = [

@@ -69,7 +69,7 @@ fn image_sizes(rows: &[Row]) -> Sizes {
         .collect()
 }
 
-/// The state of the validation.
+/// State during the validation of a data set.
 struct Validator<'a> {
     options: &'a ReadOptions,
     n_joints: Option<usize>,

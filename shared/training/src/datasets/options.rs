@@ -7,7 +7,7 @@ use crate::datasets::{FaultKind, Selection};
 pub struct ReadOptions {
     /// The people to read; all if `None`.
     pub only: Option<Selection>,
-    /// The people to leave out, such as a test set.
+    /// The people to leave out, such as the people of a test set.
     pub without: Option<Selection>,
     /// Number of joints of a person; if `None`, every person must have as many joints as the first.
     pub n_joints: Option<usize>,

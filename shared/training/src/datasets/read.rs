@@ -47,7 +47,7 @@ pub enum DatasetError {
         /// Error of the file's layout.
         source: MatLayoutError,
     },
-    /// The number of images in the list differs from the number of people.
+    /// The number of images in the list differs from the number of people in the data set.
     #[error("{} lists {got} images for {expected} people", path.display())]
     ImageList {
         /// Path of the list.

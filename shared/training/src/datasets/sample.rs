@@ -72,7 +72,7 @@ impl Sample {
     pub fn rotated(&self, degrees: f64, fill: Fill) -> Result<Self, WarpError> {
         let source = self.image.size();
         let (sin, cos) = degrees.to_radians().sin_cos();
-        // Removes the rounding error of a sine or cosine of 0, so that quarter turns are exact.
+        // Removes the rounding error of a sine or cosine of 0, so that rotations by multiples of 90 degrees are exact.
         let [sin, cos] = [sin, cos].map(|value| if value.abs() < 1e-12 { 0.0 } else { value });
         let [width, height] = [source.width, source.height].map(|value| value as f64);
         let grown = |value: f64| (value - 1e-6).ceil().max(1.0) as usize;

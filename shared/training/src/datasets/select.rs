@@ -6,7 +6,7 @@ use std::io;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-/// Some of the people of a data set.
+/// A selection of the people in a data set.
 ///
 /// A selection is written as ranges of rows from 1 (`1-100,150`), or as the path of a list file. Each line of the file is a range, a row or
 /// the file name of an image. Every entry must match a person. If entries without a person were accepted, a typing error in the list of a
@@ -121,7 +121,7 @@ impl Selection {
         self.rows.iter().any(|rows| rows.contains(&row)) || by_name()
     }
 
-    /// Checks that every range and every name matches a person.
+    /// Checks that every range and every image name of the selection matches a person.
     ///
     /// * `data`: the data set, for messages.
     /// * `people`: row and image of every person.

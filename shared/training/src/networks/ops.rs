@@ -34,9 +34,9 @@ pub struct Conv {
 /// Positions of parts in a list, and the area around them that a network uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Places {
-    /// Columns of the list with the horizontal positions, in heights of the input from its centre.
+    /// Columns of the list with the horizontal positions, relative to the centre of the input and as multiples of its height.
     pub x: Vec<usize>,
-    /// Columns of the list with the vertical positions, in heights of the input from its centre.
+    /// Columns of the list with the vertical positions, relative to the centre of the input and as multiples of its height.
     pub y: Vec<usize>,
     /// Aspect ratio of the input: its width divided by its height.
     pub width: f32,
@@ -135,14 +135,14 @@ pub(crate) fn grid(columns: usize, rows: usize) -> Vec<f32> {
 /// The cells along one side of a map, for weights around a position.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Along {
-    /// Positions of the cell centres, in heights of the input from its centre.
+    /// Positions of the cell centres, relative to the centre of the input and as multiples of its height.
     pub(crate) centres: Vec<f32>,
     /// Factor by which the exponent multiplies the squared distance from a centre.
     pub(crate) factor: f32,
 }
 
 impl Along {
-    /// The cells along a side of length `side`, which is given in heights of the input. `deviation` is in cells.
+    /// The cells along a side of length `side`, given as a multiple of the input's height. `deviation` is in cells.
     pub(crate) fn new(cells: usize, side: f32, deviation: f32) -> Self {
         let cell = side / cells as f32;
         let centre = |at: usize| (at as f32 + 0.5) * cell - 0.5 * side;

@@ -67,7 +67,7 @@ impl Album for Figures {
     }
 }
 
-/// A watch that stops the training after a number of calls of `go_on`.
+/// A watch that stops the training after a given number of calls of `go_on`.
 struct Quiet {
     left: AtomicUsize,
     placed: AtomicBool,
@@ -139,7 +139,7 @@ fn trained(settings: &Settings) -> Model {
     trainer.model().unwrap()
 }
 
-/// Largest distance of a part of the best pose from its drawn position, in pixels.
+/// Largest distance between a part of the best pose and the position at which the part was drawn, in pixels.
 fn off(model: &Model, person: usize) -> f64 {
     let model = std::sync::Arc::new(model.clone());
     let picture = Figures::drawn(person);
@@ -276,7 +276,7 @@ fn without_backgrounds_nothing_is_trained() {
 #[test]
 fn people_stay_in_the_working_set_however_well_they_are_separated() {
     let (album, watch) = (figures(), Quiet::endless());
-    // With these settings, hardly any example without a share is kept.
+    // With these settings, hardly any example whose share is 0 is kept.
     let settings = Settings {
         room: 0.0,
         cache_mib: 1,

@@ -186,7 +186,7 @@ fn cameras_at_one_place_are_an_error() {
 
 #[test]
 fn cameras_that_all_look_away_are_an_error() {
-    // After half a turn about the vertical axis, every camera looks out of the ring.
+    // After a rotation by 180 degrees about the vertical axis, every camera looks out of the ring.
     let turn = nalgebra::Isometry3::rotation(Vector3::y() * core::f64::consts::PI);
     let (outcome, text) =
         outcome_of_all(|camera| camera.camera_from_world = turn * camera.camera_from_world);

@@ -80,7 +80,7 @@ impl Options {
 }
 
 impl Sequence {
-    /// Keeps some of the frames.
+    /// Keeps a part of the frames.
     ///
     /// * `every`: keeps the first frame and every `every`-th frame after it.
     /// * `most`: maximum number of frames.

@@ -150,7 +150,7 @@ fn measures_come_from_the_static_trial_and_the_subjects_file() {
     let text = "$HeadOffset = 3\n$LShoulderOffset = 50.5\n$RShoulderOffset = 48\n";
     let got = Measures::new(&still, text).unwrap();
     assert_eq!(got.shoulder_offsets, [50.5, 48.0]);
-    // Distance of this person's shoulder markers: 400 mm across and 7 mm in height.
+    // Distance between this person's shoulder markers, which differ by 400 mm across and by 7 mm in height.
     let apart = (400.0_f64 * 400.0 + 49.0).sqrt();
     assert!((got.half_shoulders - (apart / 2.0 - 7.0)).abs() < 0.01);
     assert_eq!(Measures::new(&still, "$LShoulderOffset = 50"), None);
