@@ -11,7 +11,7 @@ pub use curve::epipolar_curve;
 /// Distance below which two cameras count as being in the same place, in metres.
 const SAME_PLACE: f64 = 1e-9;
 
-/// Returns the fundamental matrix, which takes an ideal pixel of A to its line in the ideal pixels of B.
+/// Returns the fundamental matrix, which maps an ideal pixel of A to its epipolar line in the ideal pixels of B.
 ///
 /// `F = K_b⁻ᵀ [t]ₓ R K_a⁻¹` with `R`, `t` = B from A (Hartley & Zisserman, 2nd ed., §9.2), scaled to a Frobenius norm of 1. It is the
 /// zero matrix if both cameras are in the same place (to a nanometre). There is then no epipolar constraint, and [`epipolar_line`]

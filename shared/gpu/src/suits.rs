@@ -6,7 +6,7 @@ use crate::Unsuitable;
 use crate::device::Device;
 use crate::programs::MAX_BUFFERS;
 
-/// Maximum number of types per part with which a root can be packed.
+/// Maximum number of types per part. Cell and type of a root are packed into one number, which has room for this many types.
 const MAX_TYPES: usize = 8;
 /// Side of a cell, in pixels.
 const CELL_PX: usize = 4;

@@ -150,8 +150,8 @@ fn for_each_cell(bump: &Bump, size: [usize; 2], mut cell: impl FnMut(usize, f64)
     }
 }
 
-/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. In this way, heat between neighbouring
-/// Gaussians is divided between them.
+/// Fits the heights of all Gaussians of a map by least squares, one Gaussian after the other. In this way, neighbouring Gaussians share the
+/// heat between them.
 ///
 /// * `left`: residual of the map.
 fn fit_heights(bumps: &mut [Bump], left: &mut [f64], size: [usize; 2]) {

@@ -52,8 +52,8 @@ struct Cell {
 
 /// The highest-scoring pose whose parts all overlap the marked boxes.
 ///
-/// The result is exact over all levels: since few cells overlap enough, all pairs of cells are compared. Returns `None` if there is no
-/// level on which all parts can overlap. This is so for people smaller than the model.
+/// The result is exact over all levels: since few cells have enough overlap, all pairs of cells are compared. Returns `None` if there is no
+/// level on which all parts can overlap. This happens for people who are smaller than the model.
 ///
 /// * `overlap`: minimum intersection over union of every part's box with the marked box.
 pub(crate) fn best_near(

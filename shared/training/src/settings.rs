@@ -29,7 +29,7 @@ pub struct Settings {
     pub mining_interval: usize,
     /// Cost per unit by which a negative scores above -1 (the `C` of the machine).
     pub cost: f64,
-    /// Cost of a person who scores below 1, as a multiple of the cost of a negative.
+    /// Cost per unit by which a person scores below 1, as a multiple of the cost of a negative.
     pub positive_weight: f64,
     /// Cost of a wrong pose that scores as well as the right pose of the same person, as a multiple of the cost of a negative. The value 0
     /// turns these examples off, as in Yang & Ramanan 2013.
@@ -45,7 +45,7 @@ pub struct Settings {
     pub cache_mib: usize,
     /// A negative is removed from the working set if it exceeds its margin by more than this value.
     pub room: f64,
-    /// Maximum number of negatives that are added from one image at a time, best first.
+    /// Maximum number of negatives that are added from one image at a time, those with the highest scores first.
     pub per_image: usize,
     /// Number of background images that are searched before the machine is solved again.
     pub batch: usize,

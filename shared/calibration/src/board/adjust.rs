@@ -14,7 +14,7 @@ const WRONG_SIGMAS: f64 = 5.0;
 const WRONG_PX: f64 = 0.7;
 /// Median length of a residual, in standard deviations along an axis.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410;
-/// Number of searches for wrong corners. They stand out more clearly when the other corners fit better.
+/// Number of searches for wrong corners. Wrong corners stand out more clearly when the other corners fit better.
 const ROUNDS: usize = 4;
 
 /// Adjusts cameras and boards.

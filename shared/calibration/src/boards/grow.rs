@@ -15,7 +15,7 @@ const OFF_PX: f64 = 1.2;
 /// Minimum difference between white and black at a crossing, in grey values.
 const LEAST_CONTRAST: f64 = 8.0;
 
-/// A known position on the board: metres on the board, pixels in the picture, and weight.
+/// A known point of the board: its position on the board in metres, its position in the picture in pixels, and its weight.
 pub(crate) type Known = (Point2<f64>, Point2<f64>, f64);
 
 /// Returns every visible corner of the layout, found from known positions.

@@ -1,4 +1,4 @@
-//! Inverse of a distortion: first the radius within a bracket, then Newton's method in the plane.
+//! Inverse of a distortion: first the radius is found within a bracket, then the point is refined by Newton's method in the plane.
 
 use nalgebra::{Point2, Vector2};
 

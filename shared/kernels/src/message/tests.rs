@@ -80,7 +80,7 @@ fn springs() -> impl Strategy<Value = Spring> {
         })
 }
 
-/// Scores with four values, with sixteen values, and arbitrary scores; sometimes a cell or a whole plane is impossible.
+/// Scores that have one of four values, one of sixteen values, or any value. Sometimes a cell or a whole plane is impossible.
 fn scores() -> impl Strategy<Value = f32> {
     prop_oneof![
         30 => (-8..8_i8).prop_map(|value| f32::from(value) * 0.25),

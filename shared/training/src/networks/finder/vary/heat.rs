@@ -69,7 +69,7 @@ pub(super) fn heat(people: &[Around], n: usize) -> (Vec<f32>, Vec<f32>) {
     (heat, sides)
 }
 
-/// The range of cells within three standard deviations of a middle.
+/// The range of cells within three standard deviations of the middle of a box, along one axis.
 fn around(middle: f32, spread: f32, n: usize) -> core::ops::Range<usize> {
     let reach = 3.0 * spread;
     let low = (middle - reach).max(0.0) as usize;
