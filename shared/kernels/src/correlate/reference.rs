@@ -7,7 +7,8 @@ use crate::N_CHANNELS;
 
 /// The response map of one filter in double precision.
 ///
-/// * `cells`: `map_size[0] x map_size[1] x N_CHANNELS`, channel fastest, then column. * Returns `size[0] x size[1]` responses; each is
+/// * `cells`: `map_size[0] x map_size[1] x N_CHANNELS`, channel fastest, then column.
+/// * Returns `size[0] x size[1]` responses; each is
 ///   stored at the position of the filter's top-left cell.
 ///
 /// # Panics

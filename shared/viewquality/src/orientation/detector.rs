@@ -22,8 +22,9 @@ pub struct Workspace {
     features: Vec<f32>,
 }
 
-/// The midpoint between head and neck, `[x, y]` in the unit of the parts. Head and neck are parts 0 and 1 of the published model. * Returns
-/// `None` for a model that does not have the 26 parts of the published model.
+/// The midpoint between head and neck, `[x, y]` in the unit of the parts. Head and neck are parts 0 and 1 of the published model.
+///
+/// * Returns `None` for a model that does not have the 26 parts of the published model.
 pub fn head_of(parts: &[[f64; 2]]) -> Option<[f64; 2]> {
     const N_PARTS: usize = 26;
     let ([head, neck, ..], N_PARTS) = (parts, parts.len()) else {

@@ -59,8 +59,9 @@ fn mean(of: &[f32]) -> f32 {
 }
 
 impl Marks {
-    /// Swaps the marks of left and right legs, or of left and right arms, if the teacher clearly contradicts them. * Returns two values:
-    /// true if the legs were swapped, and true if the arms were swapped.
+    /// Swaps the marks of left and right legs, or of left and right arms, if the teacher clearly contradicts them.
+    ///
+    /// * Returns two values: true if the legs were swapped, and true if the arms were swapped.
     pub fn mend_sides(&mut self) -> [bool; 2] {
         LIMBS.map(|limb| {
             let is_sure = |joint: &usize| {
