@@ -1,4 +1,4 @@
-//! The bridge of a host with cameras: takes messages of its views from shared memory, and sends the newest messages.
+//! The bridge of a host with cameras: takes the messages of its views from shared memory, and sends the newest ones to the fusing host.
 
 use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -19,7 +19,7 @@ use crate::link::Link;
 use crate::maps::{self, ViewMaps};
 use crate::topics::Topics;
 
-/// Interval at which the host introduces itself, because the other host may have been restarted.
+/// Interval at which the host introduces itself again, because the other host may have been restarted.
 const HELLO_EVERY: Duration = Duration::from_millis(500);
 /// Interval at which the end of a stream is sent until it is acknowledged.
 const END_EVERY: Duration = Duration::from_millis(300);
@@ -48,7 +48,7 @@ enum Item {
     },
 }
 
-/// Source of the messages of a lane.
+/// Source of the messages of a lane (a topic of a view).
 enum Port {
     Frame(SliceSubscriber<u8, FrameHeader>),
     Message(Content, Receiver),
@@ -93,7 +93,7 @@ struct Lane {
     evidence: Option<Evidence>,
     /// End of the stream, once it has been received.
     end: Option<Item>,
-    /// Lowest sequence whose acknowledgement shows that the end of the stream has arrived.
+    /// Lowest sequence number whose acknowledgement shows that the end of the stream has arrived.
     end_sequence: Option<u64>,
     has_ended: bool,
     end_sent: Option<Instant>,
@@ -242,7 +242,7 @@ fn listen(link: &Arc<Link>, job: &Job, origin: u64) -> Result<Listening, Failure
                 content,
                 sequence,
             }) if of == origin => {
-                // Acknowledgements for which there is no space count as lost after a while.
+                // If there is no space for an acknowledgement, it is dropped, and its message later counts as lost.
                 let _is_kept = sender.try_send((view, content, sequence)).is_ok();
             }
             Ok(_) => {}

@@ -6,11 +6,11 @@
 //! | questions and answers between two hosts | [`Signal`], [`Hello`], [`Answer`] |
 //! | offset of another host's clock from this host's clock, with a bound | [`Clock`] |
 //! | the maps of a view as Gaussians, after its poses | [`Maps`] |
-//! | messages that wait to be sent: the newest of every lane, with a limit on the number under way | [`Outbox`] |
-//! | the frame of the run to which a message belongs, and the fate of frames without a message | [`Arrivals`] |
+//! | messages that wait to be sent: the newest of every lane (topic of a view), with a limit on the number in transit | [`Outbox`] |
+//! | the frame of the run to which a message belongs, and the treatment of frames without a message | [`Arrivals`] |
 //! | check that two hosts have the same files | [`Fingerprint`] |
 //!
-//! This module uses no socket, clock or file. Only the other modules of `services/bridge` do.
+//! This module uses no sockets, clocks or files. Only the other modules of `services/bridge` do.
 
 mod arrivals;
 mod clock;

@@ -24,13 +24,13 @@ pub struct Job {
     pub maps: Vec<ViewMaps>,
     /// Width and height of the frames of every view of the deployment, in pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// Time from the session to the first instant, in nanoseconds.
+    /// Time from the start of the session to the first instant at which all cameras take a picture, in nanoseconds.
     pub lead_nanos: u64,
-    /// Time from one instant to the next, in nanoseconds.
+    /// Time from one common instant of the cameras to the next, in nanoseconds.
     pub period_nanos: f64,
     /// The first frame of the footage.
     pub start_frame: u64,
-    /// Distance from one frame to the next.
+    /// Interval between used frames, in frames of the footage.
     pub frame_step: u64,
     /// Role of this host.
     pub role: Role,
@@ -65,7 +65,7 @@ pub struct Near {
     pub n_receivers: Vec<usize>,
     /// Time that the process waits for its receivers.
     pub patience: Duration,
-    /// Largest uncertainty of another host's clock without a warning, as a share of the period.
+    /// Uncertainty of another host's clock above which a warning is logged, as a fraction of the frame period.
     pub max_clock_share: f64,
     /// File to which the state of the hosts is written: `hosts.json`.
     pub file: PathBuf,
@@ -81,7 +81,7 @@ pub struct NearHost {
 }
 
 impl Job {
-    /// Returns the instants of this host's run.
+    /// Returns the times of the frames of this host's run.
     pub(crate) fn grid(&self, session: u64) -> Grid {
         Grid {
             start_nanos: session.saturating_add(self.lead_nanos),

@@ -30,7 +30,7 @@ pub enum JoinError {
     Refused(Vec<Difference>),
 }
 
-/// Lists the differences from the point of view of this host. The fusing host wrote them from its own point of view.
+/// Lists the differences between the hosts. In the answer of the fusing host, `here` is that host; in this list, it is this host.
 pub(crate) fn listed(all: &[Difference]) -> String {
     let each = all.iter().map(|difference| {
         let (there, here) = (&difference.here, &difference.there);

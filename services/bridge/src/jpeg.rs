@@ -14,7 +14,7 @@ pub(crate) fn encode(rgb: &[u8], size: [u32; 2], quality: u8) -> Result<Vec<u8>,
     Ok(out)
 }
 
-/// Decodes the frame in a JPEG. Returns `None` if it does not have this size, or is not in colour.
+/// Decodes the frame from a JPEG file. Returns `None` if it does not have this size, or is not in colour.
 ///
 /// The size is checked before anything is decoded, because a few bytes can claim to be a very large picture.
 pub(crate) fn decode(jpeg: &[u8], size: [u32; 2]) -> Option<Vec<u8>> {

@@ -120,7 +120,7 @@ pub fn make_keys(folder: &Path, hosts: &[(String, Vec<String>)]) -> Result<Vec<P
     Ok(files.into_iter().map(|file| file.0).collect())
 }
 
-/// Fails, because keys need the feature.
+/// Fails, because keys need the feature `zenoh`.
 ///
 /// # Errors
 ///

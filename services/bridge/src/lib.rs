@@ -3,7 +3,7 @@
 //!
 //! | host | what its bridge does | where |
 //! |---|---|---|
-//! | a host with cameras | sends frames as JPEG, or poses with their maps as Gaussians; the newest message wins | `far` |
+//! | a host with cameras | sends frames as JPEG, or poses with their maps as Gaussians; replaces a waiting message by a newer one | `far` |
 //! | the fusing host | publishes the received messages for the frames of its run, and reports why a message is missing | `near` |
 //!
 //! The link uses Zenoh, behind the feature `zenoh`. The messages and the rules for them are in [`hosts`], which has no side effects.

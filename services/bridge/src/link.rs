@@ -69,7 +69,7 @@ impl Link {
         })
     }
 
-    /// Answers questions under a name.
+    /// Answers requests under a name.
     pub(crate) fn answer(
         &self,
         key: &str,
@@ -88,7 +88,7 @@ impl Link {
         })
     }
 
-    /// Asks a question under a name, and returns the first answer within a time.
+    /// Sends a request under a name, and returns the first answer within a time limit.
     pub(crate) fn ask(&self, key: &str, limit: Duration) -> Option<Vec<u8>> {
         let answers = self.0.get(key).timeout(limit).wait().ok()?;
         let answer = answers.recv_timeout(limit).ok().flatten()?;
@@ -287,7 +287,7 @@ mod tests {
             let on = move |key: &str, _: &[u8]| told.send(key.to_owned()).unwrap();
             rack.subscribe(&topics.down(host), on).unwrap();
         }
-        // It takes a moment until messages of a host arrive. Messages sent in another host's name never arrive.
+        // The first messages of a host arrive after a short delay. Messages sent in another host's name never arrive.
         let limit = Duration::from_secs(20);
         let began = std::time::Instant::now();
         while arrived.is_empty() || orders.is_empty() {

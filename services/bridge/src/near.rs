@@ -32,7 +32,7 @@ const PING_EVERY: Duration = Duration::from_millis(500);
 const SOON: Duration = Duration::from_secs(10);
 /// Interval at which the state is written.
 const REPORT_EVERY: Duration = Duration::from_millis(250);
-/// Time by which an instant may be in the future, in addition to a period, in nanoseconds.
+/// Tolerance for the time of a message that is in the future, in addition to one frame period, in nanoseconds.
 const FUTURE: u64 = 100_000_000;
 /// Longest sleep.
 const LONGEST: Duration = Duration::from_millis(20);
@@ -117,7 +117,7 @@ fn views(service: &Service, job: &Job, role: &Near) -> Result<Vec<View>, Failure
     let grid = job.grid(service.session());
     let period = job.period_nanos.round() as u64;
     let deadline = role.patience.as_nanos() as u64;
-    // Instants that passed while the process was dead are lost.
+    // The frames that were due while the process was dead are lost.
     let next = if service.epoch() == 0 {
         0
     } else {
@@ -202,7 +202,8 @@ impl Receiving<'_> {
         let (service, job) = (self.service, self.job);
         let it = &mut self.views[index];
         let instant = clock.ours(arrived.head.instant_nanos);
-        // The clock is not known yet, or the host gives a wrong time. Frames that have not begun are not given up because of this message.
+        // The clock is not known yet, or the time of the host is wrong. This message is not a reason to give up frames that are not due
+        // yet.
         let soon = now_nanos().saturating_add(job.period_nanos as u64 + FUTURE);
         if instant > soon && arrived.head.status != Status::END {
             remote.malformed(&"the message has an instant in the future");
@@ -273,7 +274,7 @@ impl Receiving<'_> {
         view.publisher.send_nothing(self.service, frame, Status::END)
     }
 
-    /// Logs hosts that appear or disappear, and clocks that are not known well enough.
+    /// Logs when a host appears or disappears, and when the clock of a host is not known accurately enough.
     fn watch(&self) {
         for remote in self.remotes.iter() {
             remote.watch(

@@ -1,11 +1,11 @@
 //! Environment variable that makes the link of a host run in one thread.
 
-/// Environment variable and its value, with which Zenoh reads from links and writes to them in one thread. Zenoh reads the variable once,
-/// so a process has to be started with it.
+/// Environment variable, and the value with which Zenoh reads from its connections and writes to them in a single thread. Zenoh reads the
+/// variable only once, so it must be set before the process starts.
 ///
 /// By default, Zenoh reads and writes a TLS connection in two threads at the same time. Neither its TLS library nor Rust allows this
-/// (Zenoh's issue 2557, open in version 1.10.2). When a host died, the bridge of the fusing host wrote to a connection in which the other
-/// thread had just stored an error, and crashed.
+/// (Zenoh's issue 2557, open in version 1.10.2). With two threads, the bridge of the fusing host crashed when another host died: one thread
+/// wrote to a connection in which the other thread had just stored an error.
 pub const ONE_THREAD: (&str, &str) = (
     "ZENOH_RUNTIME",
     "(rx: (worker_threads: 1), tx: (handover: rx), acc: (handover: rx), net: (handover: rx))",

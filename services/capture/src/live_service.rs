@@ -55,7 +55,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     let grid = Grid::new(service.session() + live.lead_nanos, live.rate_hz / step);
     let noted = camera.wait_for_receivers();
     let mut kept = Kept::open(service, job, live, &grid)?;
-    // Instants that passed while the process was dead are lost.
+    // The frames that were due while the process was dead are lost.
     let at = noted.map_or(0, |sent| sent.max(grid.latest(now_nanos()) + 1));
     let mut it = Live {
         camera,

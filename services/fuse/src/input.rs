@@ -17,9 +17,9 @@ pub(crate) enum Input {
 pub(crate) struct Candidates {
     /// Distinct poses, best first.
     pub(crate) poses: Vec<Pose>,
-    /// For each pose, the evidence of the picture for the person's front.
+    /// For each pose, the evidence in the picture for the direction in which the person faces.
     pub(crate) front: Vec<FrontEvidence>,
-    /// Time from the instant of the frame until the picture was taken, in seconds.
+    /// Time from the nominal time of the frame until the picture was taken, in seconds.
     pub(crate) skew_s: f64,
 }
 

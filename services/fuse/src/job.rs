@@ -27,7 +27,7 @@ pub struct Job {
     pub quality_deadline: Duration,
     /// Maximum age of a view's last expected errors that may be used instead.
     pub quality_max_age: Duration,
-    /// Distance between used frames, at least 1.
+    /// Interval between used frames, in frames of the footage, at least 1.
     pub frame_step: u64,
     /// Number of processes that receive the poses of pairs.
     pub n_consumers: usize,

@@ -1,4 +1,4 @@
-//! Joins the poses of views, solves this worker's pairs or all views on their evidence, and sends the poses.
+//! Joins the poses of the views, solves this worker's pairs of views (or all views at once) from their evidence, and sends the poses.
 
 use std::sync::Arc;
 

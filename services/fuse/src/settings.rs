@@ -88,8 +88,8 @@ pub fn tau_px(tau: &Tau) -> Vec<f32> {
     thresholds.px().to_vec()
 }
 
-/// Returns the median training errors. If two views are switched off, the released energy uses these errors to switch one of them on
-/// again. The list is empty if the errors are not known.
+/// Returns the median training errors. If both views of a pair are switched off, the energy of the authors' released program uses these
+/// errors to switch one of them on again. The list is empty if the errors are not known.
 fn rescue_px(tau: &Tau) -> Vec<f32> {
     training(tau).map_or_else(Vec::new, |errors| errors.median_px.to_vec())
 }

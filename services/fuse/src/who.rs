@@ -18,7 +18,7 @@ pub struct WhoJob {
     pub settings: WhoSettings,
     /// Frames of the footage per second, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between used frames, at least 1.
+    /// Interval between used frames, in frames of the footage, at least 1.
     pub frame_step: u64,
     /// Number of processes that receive the people.
     pub n_consumers: usize,
@@ -59,7 +59,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
         let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
-        // The identities are saved before they are sent, so that no identity that was sent is ever lost.
+        // The identities are saved before they are sent, so that a restarted process knows every identity that was sent.
         let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
         if let Err(error) = noted.as_ref() && is_noted {
             tracing::warn!(%error, "cannot save the identities of people: if this process dies, people get new identities");

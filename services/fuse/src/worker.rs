@@ -183,8 +183,8 @@ impl Worker<'_> {
         Ok(())
     }
 
-    /// Returns the messages of a solution. If responses are not numbers, the energy is not a number either. The evidence is then refused,
-    /// and the messages say that there is no solution.
+    /// Returns the messages of a solution. If responses are NaN, the energy is NaN too. The evidence is then refused, and the messages say
+    /// that there is no solution.
     fn or_bad_input<M: AsMut<[PairPose]>>(
         &self,
         messages: Result<M, WireError>,

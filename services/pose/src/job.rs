@@ -21,7 +21,7 @@ pub struct Keypoints {
 pub struct Source {
     /// The files.
     pub files: KeypointSource,
-    /// For cameras with clocks of their own: the frame of the files that belongs to each common instant.
+    /// For cameras with clocks of their own: the assignment of frames in the files to the instants that all cameras share.
     pub timeline: Option<Timeline>,
     /// Mapping from pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
     pub frame_from_source: [[f64; 3]; 2],
@@ -90,11 +90,11 @@ pub struct Job {
     pub n_evidence_consumers: usize,
     /// First frame to use.
     pub start_frame: u64,
-    /// Distance between used frames.
+    /// Interval between used frames, in frames of the footage.
     pub frame_step: u64,
     /// Frame rate of the footage, if known. It limits how far a pose may have moved.
     pub frame_rate_hz: Option<f64>,
-    /// For `Network`: largest number of frames of the footage between two frames in which the same people can be followed.
+    /// For `Network`: largest gap between two frames over which people can be followed, in frames of the footage.
     pub most_apart: Option<f64>,
     /// Time that the process waits for receivers.
     pub patience: Duration,

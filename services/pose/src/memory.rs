@@ -7,7 +7,7 @@ use pipeline::NetworkMemory;
 
 /// State that is kept from frame to frame.
 pub(crate) enum Memory {
-    /// The last pose, and responses that are not in shared memory.
+    /// Tracker with the last pose, and buffer for filter responses that are not written to shared memory.
     Filters(Tracker, Vec<f32>),
     Network(Box<NetworkState>),
     Keypoints(Box<KeypointState>),

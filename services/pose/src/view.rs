@@ -131,7 +131,7 @@ impl View<'_> {
         let scope = tracker.scope(layout, at);
         let mut found = self.find(step, (image, scope), responses)?;
         if step.needs_full_search(tracker, &found.estimate) {
-            // The memory for evidence is released first.
+            // The result of the first search holds memory for evidence, which is released before the second search.
             drop(found);
             found = self.find(step, (image, Scope::whole(layout)), responses)?;
         }

@@ -21,7 +21,7 @@ pub struct Job {
     pub source: Source,
     /// Pixels of the frame per pixel of the footage.
     pub frame_scale: f32,
-    /// Distance between used frames, at least 1.
+    /// Interval between used frames, in frames of the footage, at least 1.
     pub frame_step: u64,
     /// Number of processes that receive the expected errors.
     pub n_consumers: usize,

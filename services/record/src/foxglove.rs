@@ -24,7 +24,7 @@ const WORLD: &str = "world";
 const JOINT_M: f64 = 0.04;
 /// Width of a line between joints, in metres.
 const LINE_M: f64 = 0.02;
-/// Number of standard deviations that contain a point in space with a probability of 95 %.
+/// Radius, in standard deviations, of the ellipsoid that contains a 3D point with a probability of 95 %.
 const SPREAD: f64 = 2.796;
 /// Maximum size of an ellipsoid, in metres. Larger ellipsoids would hide everything.
 const LARGEST_M: f64 = 2.0;
@@ -32,7 +32,7 @@ const LARGEST_M: f64 = 2.0;
 /// The cameras and joints of a run.
 #[derive(Debug, Clone)]
 pub struct Stage {
-    /// Cameras as their frames show the world, in the order of views.
+    /// Cameras with the intrinsics of their frames (not of the original footage), in the order of views.
     pub cameras: Vec<Camera>,
     /// Joints of the result.
     pub joints: &'static JointSet,
@@ -48,7 +48,7 @@ pub(crate) struct Foxglove {
     shown: BTreeSet<u64>,
 }
 
-/// Index of the topic with the scene. A calibration and a picture topic of every view follow.
+/// Index of the topic with the scene. It is followed by a calibration topic and a picture topic for every view.
 const SCENE: usize = 0;
 const TRANSFORMS: usize = 1;
 const VIEWS: usize = 2;
@@ -304,7 +304,7 @@ fn is_sided(name: &str) -> bool {
     name.starts_with("right") || name.starts_with("left")
 }
 
-/// Returns the colour of a side of the body, as in reports.
+/// Returns the colour of a joint or limb by the side of the body in its name. Reports use the same colours.
 fn colour(name: &str, alpha: f64) -> Value {
     let rgb = if name.starts_with("right") {
         [0.90, 0.62, 0.0]

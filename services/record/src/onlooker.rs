@@ -23,8 +23,8 @@ pub struct Kept {
     pub n_lost: u64,
 }
 
-/// Writes every message of a deployment until its last result, or until it is asked to end. No sender waits: messages that do not
-/// fit into the queues are missing in the file, and counted.
+/// Writes every message of a deployment until its last result, or until `is_over` returns true. Senders never wait: messages that do not
+/// fit into the queues are missing from the file, and are counted.
 ///
 /// * `bus`: the bus of an onlooker ([`Bus::as_onlooker`]).
 /// * `session`: the session of the run.

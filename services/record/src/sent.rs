@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 /// The numbers of messages sent and received on one topic.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Sent {
-    /// Number of messages reported by the sender, by its epoch.
+    /// Number of messages reported by the sender, for each of its epochs.
     reported: BTreeMap<u64, u64>,
     n_received: u64,
     /// Number of lost messages that [`Self::lost`] has already returned.

@@ -1,4 +1,4 @@
-//! Receives every message at once. A separate thread writes the messages.
+//! Receives every message as soon as it arrives. A separate thread writes the messages.
 //!
 //! With realtime delivery, no sender waits for the disk: messages that do not fit into the queue are dropped and counted. With lossless
 //! delivery, senders wait while the queue is full, but not forever.
@@ -49,7 +49,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let epoch = service.epoch();
     if epoch > 0 && is_complete(&file_of_life(&job.file, epoch - 1)) {
-        // The process was killed after the recording was complete.
+        // An earlier start of this process completed the recording, and was then killed.
         return rest(service, &waiter, &[]);
     }
     let kind = if epoch == 0 {

@@ -15,7 +15,7 @@ use crate::queue::Outlet;
 /// Longest time from the arrival of a message until it is in the file.
 const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 
-/// Returns the path of the file for an epoch of the process. A restarted process writes another file in the same folder.
+/// Returns the path of the file that the process writes in an epoch. After a restart, it writes another file in the same folder.
 pub fn file_of_life(file: &Path, epoch: u32) -> PathBuf {
     if epoch == 0 {
         return file.to_owned();

@@ -36,7 +36,7 @@ pub struct Scene {
     pub extra_keypoints: Vec<String>,
     /// Frames of the footage per second, if known.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between used frames.
+    /// Interval between used frames, in frames of the footage.
     pub frame_step: u64,
     /// Choice of the followed person.
     pub follow: Follow,

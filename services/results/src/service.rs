@@ -1,7 +1,7 @@
-//! Receives every message at once. A separate thread writes the files.
+//! Receives every message as soon as it arrives. A separate thread writes the files.
 //!
-//! Senders wait for slow receivers, so this process must not be slow: it copies every message into a queue. If the disk
-//! cannot keep up, the newest results are dropped and counted.
+//! Senders wait for slow receivers, so this process must not be slow: it copies every message into a queue. If the disk cannot keep up, the
+//! newest results are dropped and counted.
 
 use core::time::Duration;
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Measures the time from `kill -9` of a sender to the first message of the restarted sender at a running receiver.
-//! There is no pause before the restart, as for every process that has worked for a while.
+//! Measures the time from `kill -9` of a sender to the first message of the restarted sender at a running receiver. The supervisor restarts
+//! it without a pause, as it does with any process that has worked for a while.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 

@@ -27,7 +27,7 @@ pub enum Death {
     Spun {
         /// Processor time of that iteration.
         worked: Duration,
-        /// Processor time of the longest iteration before.
+        /// Processor time of the longest earlier iteration.
         longest: Duration,
     },
     /// The process was killed because it sent no heartbeat.

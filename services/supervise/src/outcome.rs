@@ -67,7 +67,7 @@ pub struct Counts {
     pub peak_memory_bytes: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,
-    /// Messages that the process refused, by cause ([`Refusal::ALL`]). Includes heartbeats on its topic that it did not send.
+    /// Messages that the process refused, by cause ([`Refusal::ALL`]). Includes heartbeats that other processes sent on its topic.
     pub refused: [u64; Refusal::N],
 }
 

@@ -12,7 +12,7 @@ use tracing::Level;
 pub struct Plan {
     /// Program that runs every service: `executable service <service> <args>`.
     pub executable: PathBuf,
-    /// Standard input of every process, including after a restart. A file could have been removed in the meantime.
+    /// Bytes that every process reads from its standard input, also after a restart. (A file could have been removed before the restart.)
     pub given: Vec<u8>,
     /// Description of the deployment, which other programs of this user can read while it runs ([`Namespace::description`]).
     pub description: Vec<u8>,
@@ -39,7 +39,7 @@ pub struct ProcessSpec {
     pub name: String,
     /// Service that the process runs, for example `pose`.
     pub service: String,
-    /// Arguments of this process. The arguments of all services are added.
+    /// Arguments of this process only. The arguments that all services share are added to them.
     pub args: Vec<OsString>,
     /// Role, which determines whether the run continues without the process.
     pub role: Role,
@@ -48,8 +48,8 @@ pub struct ProcessSpec {
     pub senders: Vec<String>,
     /// Scheduling that the process requests from the system.
     pub scheduling: Scheduling,
-    /// Limit on the processor time of an iteration of the main loop, relative to the longest iteration so far. It applies after some
-    /// messages. An iteration that takes longer counts as an endless loop. `None` if the iterations are not
+    /// Limit on the processor time of an iteration of the main loop, as a multiple of the longest iteration so far. An iteration that takes
+    /// longer counts as an endless loop. The limit applies once the process has sent a few messages. `None` if the iterations are not
     /// comparable.
     pub most_work: Option<u32>,
 }
@@ -88,8 +88,8 @@ pub struct Policy {
     pub silence_limit: Duration,
     /// Longest time that the main loop of a process may hang. It is longer than any frame takes.
     pub hang_limit: Duration,
-    /// Longest time that a process may wait without receiving a message. It applies after other processes have finished and some
-    /// were restarted or given up.
+    /// Longest time that a process may wait without receiving a message. It applies only when other processes have finished, and at least
+    /// one process was restarted or given up.
     pub idle_limit: Duration,
     /// Time that processes have to end after the stop request.
     pub grace: Duration,

@@ -10,7 +10,7 @@ use std::{io, thread};
 #[derive(Debug)]
 pub(crate) struct Stall {
     watched: Arc<Watched>,
-    /// Dropping this sender ends the watching thread, whose receiver notices it.
+    /// The watching thread ends when this sender is dropped.
     _end: SyncSender<()>,
 }
 

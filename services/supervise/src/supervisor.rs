@@ -17,9 +17,9 @@ use crate::{Death, Event, Outcome, Plan, Role};
 
 /// Longest sleep of the supervisor, and so the longest delay until a hang or a due restart is noticed.
 const TURN: Duration = Duration::from_millis(50);
-/// If an iteration took this long, the supervisor itself was stopped and received no heartbeats.
+/// If one of its iterations took this long, the supervisor itself was suspended and could not receive heartbeats.
 const ASLEEP: Duration = Duration::from_secs(2);
-/// Longest time without an answer from shared memory. The transport may wait forever if a file was truncated.
+/// Longest time without an answer from shared memory. The transport may wait forever if one of its files was truncated.
 const LONGEST_STALL: Duration = Duration::from_mins(1);
 /// Message if shared memory does not answer in this time.
 const STALLED: &str = "error: shared memory of the deployment has not answered the supervisor for a minute\n  hint: another program has \
@@ -90,7 +90,7 @@ impl Fault for SuperviseError {
     }
 }
 
-/// Time after which the stop request is repeated. It is short enough to count as the same request (`failure::Stop`).
+/// Time after which the stop request is repeated. The repetition comes soon enough to count as the same request (`failure::Stop`).
 const REPEAT_STOP: core::ops::Range<Duration> =
     Duration::from_millis(100)..Duration::from_millis(300);
 
@@ -333,7 +333,7 @@ impl Supervisor<'_> {
         // Receives the last messages of the process.
         self.receive(index, now);
         let watch = &mut self.watches[index];
-        // A process may end early if it was signalled together with the supervisor.
+        // A process may end before it is told to, if it received the same signal as the supervisor.
         let is_in_order =
             watch.reports_finished() || watch.is_dismissed || self.stop.is_requested();
         if let Some(death) = death_of(status, is_in_order) {
@@ -433,8 +433,8 @@ impl Supervisor<'_> {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
             let patient = waited < self.plan.policy.grace;
-            // Two signals at the same time may merge into one signal, whose sender may be the other process. Therefore, the signal is
-            // repeated.
+            // Two signals that arrive at the same time may merge into one, which may name the other process as its sender. Therefore, the
+            // signal is repeated.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
                 is_repeated = true;
                 self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);

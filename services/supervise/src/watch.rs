@@ -12,7 +12,7 @@ use runtime::{Child, Subscriber};
 
 use crate::{Counts, Death, Policy, ProcessOutcome, ProcessSpec, State};
 
-/// If a main loop has had an iteration within this time, it is waiting, not computing.
+/// A main loop that has completed an iteration within this time counts as waiting for messages, not as computing.
 const WAITING: Duration = Duration::from_secs(1);
 /// Number of messages that a process has to send before iterations are compared, because the first iterations take more work.
 const WARM_UP_MESSAGES: u64 = 8;
@@ -31,7 +31,7 @@ pub(crate) struct Watch {
     restarts: VecDeque<Instant>,
     /// Time of the first iteration of the main loop since the last start.
     at_work_since: Option<Instant>,
-    /// True if the main loop ran before an earlier restart. Its input was then usable.
+    /// True if the main loop ran before an earlier restart, which shows that the input was usable.
     has_worked: bool,
     /// Number of consecutive deaths of the process before [`Policy::steady_after`].
     n_hasty: u32,
@@ -256,7 +256,7 @@ impl Watch {
         } else if still <= policy.hang_limit {
             None
         } else if silent > still / 2 {
-            // A stopped process makes no iterations either, so the missing heartbeats are reported.
+            // A stopped process neither iterates nor sends heartbeats. The missing heartbeats are reported as the cause.
             Some(Death::Silent { still: silent })
         } else {
             Some(Death::Hung { still })

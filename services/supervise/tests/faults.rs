@@ -90,7 +90,7 @@ fn a_sender_that_waits_for_a_killed_receiver_continues() {
         ],
     );
     case.plan.policy.max_restarts = 0;
-    // The sink received the messages that were sent before the dam blocked the sender.
+    // The process `sink` received the messages that were sent before the full queue of the process `dam` blocked the sender.
     let run = case.run(kill_once("dam", "-9", |event| {
         is_line(event, "dam", "holding")
     }));

@@ -1,4 +1,5 @@
-//! Joins the poses of the views with the identities of people, solves over the evidence in shared memory, and sends the results.
+//! Joins the poses of the views with the identities of people, computes 3D joints from the evidence in shared memory, and sends the
+//! results.
 
 use core::time::Duration;
 use std::cell::Ref;
@@ -21,10 +22,10 @@ pub struct SpaceJob {
     pub plans: Vec<Arc<ViewPlan>>,
     /// Step that triangulates the extra keypoints.
     pub extras: ExtrasStep,
-    /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
-    /// of its frame.
+    /// Frames of the footage per second, if known. Without it, positions are not corrected for the difference between the capture time of a
+    /// picture and the nominal time of its frame.
     pub frame_rate_hz: Option<f64>,
-    /// Distance between used frames, at least 1.
+    /// Interval between used frames, in frames of the footage, at least 1.
     pub frame_step: u64,
     /// Number of processes that receive the result.
     pub n_consumers: usize,
@@ -39,9 +40,9 @@ enum Input {
     People(FramePeople),
 }
 
-/// Solves every frame in space, until all inputs end or a stop is requested.
+/// Computes the 3D joints of every frame, until all inputs end or a stop is requested.
 ///
-/// * `step`: keeps the sides and bone lengths from previous frames.
+/// * `step`: remembers, from frame to frame, which side is left and how long the bones are.
 ///
 /// # Errors
 ///

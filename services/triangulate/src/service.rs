@@ -12,7 +12,7 @@ use runtime::Service;
 use stage::{Frame, Item, Stage};
 use wire::{SolvedPerson, WireError};
 
-/// Identity of the followed person. The paper's method has only one person, without identities.
+/// Identity that is reported for the followed person. The paper's method follows only one person, and has no identities.
 const UNNAMED: u64 = 1;
 
 /// The job of the process.
@@ -25,8 +25,8 @@ pub struct Job {
     /// The pairs of the deployment, assigned to the workers in turn. If all views are solved at once, the pairs of the first view with each
     /// other view.
     pub pairs: Vec<[usize; 2]>,
-    /// Frames of the footage per second, if known. Without it, positions are not corrected for the time between the picture and the instant
-    /// of its frame.
+    /// Frames of the footage per second, if known. Without it, positions are not corrected for the difference between the capture time of a
+    /// picture and the nominal time of its frame.
     pub frame_rate_hz: Option<f64>,
     /// Number of fusion workers.
     pub n_workers: usize,
@@ -100,9 +100,9 @@ enum Input {
 #[derive(Debug)]
 struct Found {
     candidates: Vec<Pose>,
-    /// Evidence of the pictures for the direction in which each pose faces.
+    /// For each pose, the evidence in the picture for the direction in which the person faces.
     front: Vec<FrontEvidence>,
-    /// Time from the instant of the frame until the picture was taken, in seconds.
+    /// Time from the nominal time of the frame until the picture was taken, in seconds.
     skew_s: f64,
 }
 

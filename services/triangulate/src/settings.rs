@@ -2,7 +2,7 @@
 
 use deployment::paper::Combine;
 
-/// Returns how a view's pose is combined from the poses of its pairs.
+/// Returns the way in which a view's pose is computed from the poses of its pairs.
 pub fn combine(from: Combine) -> pipeline::Combine {
     match from {
         Combine::Mean => pipeline::Combine::Mean,

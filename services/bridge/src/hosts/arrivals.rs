@@ -2,16 +2,16 @@
 
 use messages::Status;
 
-/// Tolerance beyond the middle between two instants, in periods. Within it, a message still belongs to the instant that is due next.
-/// Without it, messages would jump between two instants if two clocks differ by half a period.
+/// Tolerance beyond the midpoint between two frame times, in periods. Within it, a message still belongs to the frame that is due next.
+/// Without it, messages would alternate between two frames if two clocks differ by half a period.
 const SLACK: f64 = 0.1;
 
-/// The instants of the run: `start + nth * period`, by this host's clock.
+/// The frame times of the run: `start + nth * period`, by this host's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
-    /// Time of the first instant, in nanoseconds.
+    /// Time of the first frame, in nanoseconds.
     pub start_nanos: u64,
-    /// Time from one instant to the next, in nanoseconds.
+    /// Time from one common instant of the cameras to the next, in nanoseconds.
     pub period_nanos: f64,
 }
 
@@ -21,7 +21,7 @@ impl Grid {
         self.start_nanos.saturating_add((nth as f64 * self.period_nanos).round() as u64)
     }
 
-    /// Returns the latest instant that is not after a time; 0 before the first.
+    /// Returns the index of the last instant at or before a time; 0 if there is none.
     pub fn latest(&self, nanos: u64) -> u64 {
         self.exact(nanos).max(0.0) as u64
     }
@@ -38,7 +38,7 @@ pub enum Gap {
     Late,
     /// The host did not answer.
     Gone,
-    /// A newer message arrived first: the link or the camera's process had no time for this message.
+    /// A newer message arrived first: the link or the camera's process was too busy to send this message.
     LeftOut,
 }
 
@@ -60,7 +60,7 @@ pub enum Place {
     Frame(u64),
     /// The message belongs to a frame that was given up.
     Late,
-    /// The message belongs to no frame: its frame already has one, or it is before or after all frames.
+    /// The message belongs to no frame: its frame already has a message, or its time is before the first frame or after the last.
     Surplus,
 }
 
@@ -73,7 +73,7 @@ pub struct Tally {
     pub n_late: u64,
     /// Number of frames given up because their host did not answer.
     pub n_gone: u64,
-    /// Number of frames left out because a newer message arrived first.
+    /// Number of frames without a message because a newer message arrived first.
     pub n_left_out: u64,
     /// Number of messages that arrived after their frame was given up. These frames are included in the counts above.
     pub n_came_late: u64,
@@ -81,7 +81,7 @@ pub struct Tally {
     pub n_surplus: u64,
 }
 
-/// The messages of one view. Does not read a clock.
+/// The messages of one view. The caller passes the time, so no clock is read.
 #[derive(Debug, Clone)]
 pub struct Arrivals {
     grid: Grid,
@@ -126,7 +126,7 @@ impl Arrivals {
 
     /// Returns the frame to which a message belongs.
     ///
-    /// * `instant_nanos`: the instant that the sending host assigned, converted to this host's clock.
+    /// * `instant_nanos`: the frame time that the sending host assigned, converted to this host's clock.
     pub fn place(&mut self, instant_nanos: u64) -> Place {
         let exact = self.grid.exact(instant_nanos);
         let nth = if (exact - self.next as f64).abs() <= 0.5 + SLACK {
@@ -152,7 +152,7 @@ impl Arrivals {
         }
     }
 
-    /// Returns the frame with the nearest instant; 0 before the first.
+    /// Returns the frame whose nominal time is nearest; 0 before the first frame.
     pub fn nearest(&self, instant_nanos: u64) -> u64 {
         self.grid.exact(instant_nanos).round().max(0.0) as u64
     }

@@ -1,22 +1,23 @@
 //! Estimates the offset and drift of another host's clock, with a bound on the error.
 //!
-//! An exchange of four times (RFC 5905, section 8) bounds the offset by half of its round trip, however the delay is divided between the
-//! two directions. The window is divided into parts. In each part, only the exchange with the shortest round trip is used, as in the clock
-//! filter of NTP. A line through these exchanges gives offset and drift.
+//! An exchange of four time stamps (RFC 5905, section 8) bounds the error of the offset by half of the round trip, however the delay is
+//! divided between the two directions. The window is divided into parts. In each part, only the exchange with the shortest round trip is
+//! used, as in the clock filter of NTP. A line through these exchanges gives offset and drift.
 
 use std::collections::VecDeque;
 
-/// Number of parts of the window. The best exchange of each part is kept.
+/// Number of parts of the time window. The best exchange of each part is kept.
 const N_PARTS: usize = 12;
 /// Length of a part, in nanoseconds.
 const PART_NANOS: u64 = 5_000_000_000;
-/// Minimum time between the exchanges from which a drift is estimated, in nanoseconds.
+/// Minimum time span of the exchanges from which a drift is estimated, in nanoseconds.
 const LEAST_SPAN: u64 = 5_000_000_000;
-/// Maximum relative drift of two clocks if nothing is known. The kernel adjusts each clock by at most 500 ppm.
+/// Maximum relative drift of two clocks, which is assumed until the drift has been measured. The kernel adjusts each clock by at most 500
+/// ppm.
 const MOST_DRIFT: f64 = 1e-3;
 /// Longest round trip that is used, in nanoseconds.
 const MOST_TRIP: u64 = 2_000_000_000;
-/// Number of consecutive exchanges contradicting the estimate after which the other clock counts as a new one.
+/// Number of consecutive exchanges that must contradict the estimate before the other clock counts as a new one.
 const N_ODD: u32 = 3;
 
 /// The four times of a question and its answer, in nanoseconds.
@@ -63,7 +64,7 @@ pub struct Estimate {
     pub offset_nanos: i64,
     /// Drift in parts per billion: how much shorter a second of the other clock is than one of this host's clock.
     pub drift_ppb: f64,
-    /// Bound on the error of the offset, in nanoseconds: half of the best round trip, and the possible effect of the drift.
+    /// Bound on the error of the offset, in nanoseconds: half of the shortest round trip, plus the possible effect of the drift.
     pub bound_nanos: u64,
     /// Shortest round trip in the window, in nanoseconds.
     pub trip_nanos: u64,
@@ -84,9 +85,9 @@ impl Estimate {
         theirs.clamp(0, i128::from(u64::MAX)) as u64
     }
 
-    /// Returns a warning if the bound is too large a share of the time between two frames.
+    /// Returns a warning if the bound is too large compared with the time between two frames.
     ///
-    /// * `max_share`: largest share without a warning.
+    /// * `max_share`: largest bound without a warning, as a fraction of the time between two frames.
     pub fn warning(&self, period_nanos: u64, max_share: f64) -> Option<String> {
         let share = self.bound_nanos as f64 / period_nanos.max(1) as f64;
         (share > max_share).then(|| {
@@ -113,7 +114,7 @@ struct Sample {
     trip: u64,
 }
 
-/// The clock of another host. Does not read a clock itself.
+/// The clock of another host. The caller passes the time, so no clock is read.
 #[derive(Debug, Clone, Default)]
 pub struct Clock {
     /// The best exchange of every part of the window, oldest first, with the index of the part.
@@ -174,7 +175,7 @@ impl Clock {
         let line = Line::through(&all(), best);
         let at = |time: u64| line.at(time);
         let bound = all().map(|sample| {
-            // Sum of the exchange's own bound, its distance from the line, and the effect of the drift's error since then.
+            // Sum of the exchange's own bound, its distance from the line, and the effect of an error of the drift since the exchange.
             let off = (at(sample.at) - sample.offset as f64).abs();
             let age = time_between(now, sample.at).abs();
             sample.trip as f64 / 2.0 + off + line.drift_error * age

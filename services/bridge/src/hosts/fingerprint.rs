@@ -3,7 +3,8 @@
 use formats::checksum::fnv1a;
 use serde::{Deserialize, Serialize};
 
-/// Hashes of the files and settings that must be the same on all hosts, by name. They detect mistakes. The keys protect against attacks.
+/// Hashes of the files and settings that must be the same on all hosts, by name. The hashes detect mistakes; protection against attacks is
+/// the task of the keys.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Fingerprint(Vec<(String, String)>);
 

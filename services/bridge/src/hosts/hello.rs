@@ -1,4 +1,5 @@
-//! The introduction of a host with cameras, and the answer of the fusing host. Both are JSON, because they are short and rare.
+//! The introduction of a host with cameras, and the answer of the fusing host. Both are sent as JSON, because they are short and
+//! infrequent.
 
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,7 @@ const EACH: usize = 28;
 /// Maximum number of Gaussians in a message.
 pub const MOST_GAUSSIANS: usize = 1024;
 
-/// A Gaussian of the heat in a joint's map.
+/// A Gaussian that approximates a peak of the heat in a joint's map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gaussian {
     /// Index of the joint.

@@ -1,8 +1,9 @@
-//! Messages that wait to be sent to another host. In every lane, only the newest message waits, and few are under way.
+//! Messages that wait to be sent to another host. In every lane (topic of a view), only the newest message waits, and only a few are in
+//! transit.
 
 use std::collections::VecDeque;
 
-/// Maximum number of unacknowledged parcels of a lane that are under way.
+/// Maximum number of parcels (numbered messages) of a lane that were sent and not acknowledged.
 const MOST_ON_WAY: usize = 3;
 /// Time without an acknowledgement after which a parcel counts as lost, in nanoseconds.
 const LOST_AFTER: u64 = 1_500_000_000;
@@ -35,7 +36,7 @@ pub struct Sent {
     pub n_lost: u64,
 }
 
-/// The lanes to one other host. Does not read a clock.
+/// The lanes to one other host. The caller passes the time, so no clock is read.
 #[derive(Debug)]
 pub struct Outbox<T> {
     lanes: Vec<Lane<T>>,
@@ -62,7 +63,7 @@ impl<T> Outbox<T> {
         }
     }
 
-    /// Puts a message into a lane. A message that waits there is overtaken.
+    /// Puts a message into a lane. It replaces a message that waits there, which counts as overtaken.
     pub fn offer(&mut self, lane: usize, item: T) {
         if let Some(lane) = self.lanes.get_mut(lane) {
             lane.sent.n_offered += 1;
@@ -94,8 +95,8 @@ impl<T> Outbox<T> {
         })
     }
 
-    /// Records that a parcel has arrived. Earlier parcels of its lane that were not acknowledged are lost, because the link keeps
-    /// the order.
+    /// Records that a parcel has arrived. Because the link keeps the order, earlier parcels of the same lane that were not acknowledged are
+    /// lost.
     ///
     /// Returns the time since it was sent, in nanoseconds; `None` if it was not under way.
     pub fn acknowledge(&mut self, lane: usize, sequence: u64, now_nanos: u64) -> Option<u64> {

@@ -12,7 +12,7 @@ pub const HEAD_BYTES: usize = 128;
 const HASH_AT: usize = HEAD_BYTES - 8;
 /// Limit on the number of a frame, as in `wire`.
 const MOST_FRAMES: u64 = 1 << 48;
-/// Maximum time between a picture and the instant of its frame, in nanoseconds: an hour.
+/// Maximum difference between the capture time of a picture and the nominal time of its frame, in nanoseconds: an hour.
 const MOST_SKEW: u64 = 3_600_000_000_000;
 
 /// Kind of the body.
@@ -51,7 +51,7 @@ pub struct Head {
     pub view: u32,
     /// Status of the result: good, or why it is missing.
     pub status: Status,
-    /// Start time of the sending bridge, which identifies the bridge. Sequences start again with each bridge.
+    /// Start time of the sending bridge, which identifies the bridge. Sequence numbers start again at 0 with each bridge.
     pub origin: u64,
     /// Number of the message among the messages of this view and content, counted from 0.
     pub sequence: u64,
@@ -67,9 +67,9 @@ pub struct Head {
     pub sent_at_nanos: u64,
     /// Time at which the packet was ready to be sent.
     pub packed_at_nanos: u64,
-    /// Time from the instant until the picture was taken, in nanoseconds.
+    /// Time from the nominal time of the frame until the picture was taken, in nanoseconds.
     pub skew_nanos: i64,
-    /// Number of frames for which the camera's process had no time, since its run began.
+    /// Number of frames that the camera's process has skipped since the start of its run because it was too slow.
     pub n_dropped: u64,
     /// Number of messages of this view and content that were overtaken by newer messages before they were sent, since the bridge started.
     pub n_overtaken: u64,
@@ -108,7 +108,7 @@ pub enum PacketError {
         /// Length according to the head, or the shortest possible length.
         expected: usize,
     },
-    /// The packet does not start with the mark of packets.
+    /// The packet does not start with the magic bytes of packets.
     #[error("the message is not a packet of Parallax: it begins with {0:02x?}")]
     Magic([u8; 4]),
     /// The other host has another version.
@@ -134,7 +134,7 @@ pub enum PacketError {
         field: &'static str,
         /// Value of the field.
         got: u64,
-        /// Accepted value, or the largest accepted one.
+        /// Accepted value, or largest accepted value.
         expected: u64,
     },
 }

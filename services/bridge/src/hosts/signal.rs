@@ -8,19 +8,19 @@ use crate::hosts::packet::Content;
 const MAGIC: [u8; 4] = *b"PXHS";
 const BYTES: usize = 56;
 
-/// A short message between two bridges. Times are of the writing host's clock, in nanoseconds.
+/// A short message between two bridges. All times are by the clock of the host that wrote the message, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
     /// Asks for the time of the other host.
     Ping {
-        /// Start time of the asking bridge.
+        /// Start time of the bridge that sent the question.
         origin: u64,
         /// Time at which the question was sent.
         asked_at: u64,
     },
     /// Answers a [`Self::Ping`].
     Pong {
-        /// Start time of the answering bridge.
+        /// Start time of the bridge that sent the answer.
         origin: u64,
         /// Time at which the question was sent, copied from the question.
         asked_at: u64,

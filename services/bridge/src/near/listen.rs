@@ -19,7 +19,7 @@ use crate::link::Link;
 use crate::maps::{self, ViewMaps};
 use crate::topics::{Topics, host_of};
 
-/// Maximum number of packets of a view that wait to be decoded. It is more than a correct host has under way.
+/// Maximum number of packets of a view that wait to be decoded. A correct host never has this many packets in transit.
 const MOST_WAITING: usize = 8;
 /// Maximum number of messages that wait to be published.
 const MOST_ARRIVED: usize = 256;
@@ -43,7 +43,7 @@ impl Arrived {
         self.head.view as usize
     }
 
-    /// Returns true if the message accompanies another message of its frame. Only the other message is counted.
+    /// Returns true if the message only accompanies another message of its frame. In this case, only the other message is counted.
     pub(super) fn is_beside(&self) -> bool {
         self.head.content == Content::ViewQuality
     }
@@ -308,7 +308,7 @@ fn hear_signals(
                 received_at,
                 answered_at,
             }) => {
-                // Only answers of the welcomed bridge are used. Answers of earlier bridges may be from another clock.
+                // Only answers of the accepted bridge are used, because answers of earlier bridges may refer to another clock.
                 if remote.state().welcomed == Some(of) {
                     remote.exchanged(Exchange {
                         asked_at,
@@ -325,7 +325,7 @@ fn hear_signals(
     heard.or_fail(ExitKind::Run)
 }
 
-/// Welcomes hosts, or refuses them.
+/// Accepts hosts into the run, or refuses them.
 fn hear_hellos(
     link: &Arc<Link>,
     topics: &Topics,

@@ -56,8 +56,8 @@ pub(super) struct Times {
 impl Times {
     /// Converts the times of a message.
     ///
-    /// * `instant`: instant that the sending host assigned, by this host's clock.
-    /// * `due`: instant of the frame on this host.
+    /// * `instant`: frame time that the sending host assigned, converted to this host's clock.
+    /// * `due`: nominal time of the frame on this host.
     pub(super) fn of(head: &Head, clock: &Estimate, instant: u64, due: u64) -> Self {
         let now = now_nanos();
         let ours = |nanos: u64| clock.ours(nanos).min(now);

@@ -22,7 +22,7 @@ pub(super) struct Remote {
 #[derive(Debug, Default, Clone)]
 pub(super) struct State {
     pub(super) clock: Clock,
-    /// Start of the welcomed bridge.
+    /// Start time of the accepted bridge.
     pub(super) welcomed: Option<u64>,
     pub(super) refused: Option<Vec<Difference>>,
     heard_at: Option<u64>,
@@ -31,13 +31,13 @@ pub(super) struct State {
     /// Number of malformed packets. The next field is the reason for the last one.
     pub(super) n_malformed: u64,
     pub(super) last_malformed: String,
-    /// Number of packets from a bridge that was not welcomed, or not yet.
+    /// Number of packets from a bridge that has not been accepted.
     pub(super) n_unknown: u64,
     /// Number of packets that arrived before the clock of the host was known.
     pub(super) n_without_clock: u64,
     /// Number of packets for which there was no space, because the host sends too many.
     pub(super) n_no_room: u64,
-    /// Number of times that the host appeared, and disappeared.
+    /// Number of times that the host appeared, and number of times that it disappeared.
     pub(super) n_came: u64,
     pub(super) n_went: u64,
     was_there: bool,
@@ -62,7 +62,7 @@ impl Remote {
         self.state().heard_at = Some(now);
     }
 
-    /// Returns true if the host was welcomed, and has sent a message recently.
+    /// Returns true if the host was accepted, and has sent a message recently.
     pub(super) fn is_there(&self, now: u64) -> bool {
         self.state().is_there(now)
     }
@@ -85,12 +85,12 @@ impl Remote {
         }
     }
 
-    /// Records that a bridge of the host was welcomed.
+    /// Records that a bridge of the host was accepted.
     pub(super) fn welcomed(&self, origin: u64, now: u64) {
         let mut state = self.state();
         state.heard_at = Some(now);
         if state.welcomed.replace(origin) != Some(origin) {
-            // The host may have been restarted, too. Its clock is then a new one.
+            // The host itself may have been restarted, in which case its clock is a new one.
             state.clock.forget();
             state.refused = None;
         }
@@ -121,7 +121,7 @@ impl Remote {
         }
     }
 
-    /// Logs when the host starts or stops answering. Also logs once if its clock is not known well enough.
+    /// Logs when the host starts or stops answering. Also logs once if its clock is not known accurately enough.
     pub(super) fn watch(&self, now: u64, period_nanos: f64, max_share: f64) {
         let mut state = self.state();
         let is_there = state.is_there(now);

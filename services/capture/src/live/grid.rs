@@ -14,7 +14,7 @@ const LEAST_INTERVALS: usize = 5;
 /// Largest accepted difference between a camera's clock and this machine's clock, in nanoseconds.
 const MAX_OFF_NANOS: u64 = 2_000_000_000;
 
-/// The instants `start + k / rate`. Does not read a clock.
+/// The instants `start + k / rate`. The caller passes the time, so no clock is read.
 #[derive(Debug)]
 pub(crate) struct Grid {
     start_nanos: u64,
@@ -47,7 +47,7 @@ impl Grid {
         self.start_nanos.saturating_add((nth as f64 * self.period).round() as u64)
     }
 
-    /// Returns the latest instant that is not after `now_nanos`; 0 before the first.
+    /// Returns the index of the last instant at or before `now_nanos`; 0 if there is none.
     pub(crate) fn latest(&self, now_nanos: u64) -> u64 {
         self.exact(now_nanos).max(0.0) as u64
     }

@@ -11,7 +11,7 @@ const MOST_MEASUREMENTS: usize = 240;
 /// Minimum time for which a camera must have been measured before its drift is reported, in nanoseconds.
 const LEAST_NANOS: u64 = 5_000_000_000;
 
-/// Follows the skew of a camera. Does not read a clock.
+/// Follows the skew of a camera. The caller passes the time, so no clock is read.
 #[derive(Debug)]
 pub(crate) struct Phase {
     period_nanos: u64,

@@ -234,7 +234,7 @@ fn heads(
     for entry in &track.entries {
         let head = recording::read_head(input, track.kind, entry, &mut buffer)?;
         let header: PictureHeader = pod_read_unaligned(head);
-        // The index of the file also has the frame number and the send time, and its checksum was verified.
+        // The file's index, whose checksum was verified, also has the frame number and the send time.
         let is_same = entry.frame.is_none_or(|frame| frame == header.stamp.frame)
             && entry.publish_time == header.timing.sent_at_nanos;
         let age = header.timing.sent_at_nanos.abs_diff(header.stamp.captured_at_nanos);

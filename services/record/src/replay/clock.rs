@@ -25,11 +25,11 @@ pub(crate) struct Clock {
     pub pace: Pace,
 }
 
-/// Time from the planning of the run to the first message, at a given speed.
+/// Time from the planning of the run to the first message, if a replay speed is given.
 const LEAD_NANOS: u64 = 2_000_000_000;
 
 impl Clock {
-    /// Returns the time at which the first message is sent, by this machine's clock, at a given speed.
+    /// Returns the time at which the first message is sent, by this machine's clock, if a replay speed is given.
     fn begin(&self) -> u64 {
         self.planned.saturating_add(LEAD_NANOS)
     }

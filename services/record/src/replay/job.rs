@@ -14,7 +14,7 @@ pub struct Job {
     pub outputs: Vec<Output>,
     /// Replay speed.
     pub pace: Pace,
-    /// Distance between used frames, for a recording without an end of stream.
+    /// Interval between used frames, in frames of the footage. It is needed for a recording without an end of stream.
     pub frame_step: u64,
     /// Time that the process waits for receivers.
     pub patience: Duration,

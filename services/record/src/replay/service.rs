@@ -115,9 +115,8 @@ fn end_after(
 
 /// Returns the last frame of a track; `None` if the track has no message of the session.
 ///
-/// This is the frame of the last readable message, or of a damaged one after it. Most frame numbers in a damaged chunk are right, and
-/// without them the last frames of a run would be missing. A number is only used if that many frames fit into the damaged
-/// messages.
+/// This is the frame of the last readable message, or of a damaged one after it. Most frame numbers in a damaged chunk are right, and the
+/// last frames of a run would be missing if they were ignored. A number is only used if that many frames fit into the damaged messages.
 ///
 /// * `recorded`: the session, and the distance between two frames.
 fn last_of(file: &mut File, kind: Kind, entries: &[Entry], recorded: [u64; 2]) -> Option<Stamp> {

@@ -83,8 +83,8 @@ fn a_quiet_network_gives_the_offset_within_microseconds_and_the_drift() {
 fn noise_is_filtered_by_the_shortest_round_trips() {
     let (got, truth) = after(60, &mut other(0.1, 0.1, 5.0, 20.0));
     let off = (got.offset_nanos - truth).abs();
-    // The mean of all exchanges would be off by milliseconds divided by the root of 60. A single exchange would be off by up to tens of
-    // milliseconds.
+    // The mean of all exchanges would be wrong by a few milliseconds divided by the square root of 60. A single exchange could be wrong by
+    // tens of milliseconds.
     assert!(off < 1_500_000, "{off} ns");
     assert!(got.bound_nanos as i64 >= off, "{} {off}", got.bound_nanos);
 }
