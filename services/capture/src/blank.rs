@@ -1,4 +1,4 @@
-//! Footage of a camera without pictures: grey frames, as many as its keypoints need.
+//! Grey frames in place of the pictures of a camera that has only keypoints. There is one frame for each frame of the keypoints.
 
 use core::fmt;
 
@@ -17,7 +17,7 @@ const MOST_FRAMES: u64 = 1_000_000_000_000;
 /// Lowest and highest frame rate, per second.
 const RATES_HZ: [f64; 2] = [0.001, 1e5];
 
-/// Grey footage, such as `blank://1920x1080?frames=70&rate=60`.
+/// Grey frames as the source of a camera, such as `blank://1920x1080?frames=70&rate=60`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blank {
     /// Size of every frame.
@@ -28,7 +28,7 @@ pub struct Blank {
     pub rate_hz: f64,
 }
 
-/// Error for an invalid address of grey footage.
+/// Error for an invalid `blank://` URL.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum BlankError {
     /// A part of the address is missing or unknown.
@@ -50,7 +50,7 @@ pub enum BlankError {
 }
 
 impl Blank {
-    /// Returns true if a source is the address of grey footage.
+    /// Returns true if a source is a `blank://` URL.
     pub fn is_blank(source: &str) -> bool {
         source.starts_with(SCHEME)
     }

@@ -15,12 +15,12 @@ use crate::job::Job;
 use crate::supply::{Step, Supply};
 use deployment::capture::{Mode, Pace};
 
-/// Time at which a picture was taken, and time at which it was requested or arrived, in nanoseconds.
+/// Time at which a picture was taken, and time at which it was requested (footage) or arrived (live camera), in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Shot {
     pub(crate) captured_at: u64,
     pub(crate) asked_at: u64,
-    /// Time from the instant of the frame until the picture was taken.
+    /// Time from the nominal time of the frame until the picture was taken.
     pub(crate) skew: i64,
 }
 
@@ -82,7 +82,8 @@ impl<'a> Camera<'a> {
         let mut stage = Stage::new(service, job.patience);
         let publisher = stage.bulk_output(&topic::frame(job.view), job.n_consumers)?;
         let [width, height] = job.framing.out_size().map(|side| side as usize);
-        // The area outside a rotated picture is black. Otherwise the border is repeated, as in the reference program.
+        // The area outside a rotated picture is filled with black. Without rotation, the border pixels are repeated, as in the authors'
+        // program.
         let fill = if job.framing.roll() == 0.0 {
             Fill::Replicate
         } else {
@@ -134,7 +135,7 @@ impl<'a> Camera<'a> {
         Ok(self.stage.wait(Duration::ZERO)? == Woken::Stop)
     }
 
-    /// Counts frames that were not sent because this process was behind its clock.
+    /// Counts frames that were not sent because this process was too late for them.
     pub(crate) fn drop_frames(&mut self, n: u64) {
         self.n_dropped += n;
         self.service.health().dropped(Cause::BehindClock, n);

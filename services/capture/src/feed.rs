@@ -23,7 +23,7 @@ pub enum FeedError {
         /// Mistake in the address.
         source: AddressError,
     },
-    /// The address of grey footage is invalid.
+    /// The `blank://` URL of grey frames is invalid.
     #[error("{address}: {source}")]
     Blank {
         /// Address as the user wrote it.
@@ -59,7 +59,7 @@ pub enum Feed {
     Scene(Box<Stage>),
     /// Grey frames, for a camera whose pictures are not used.
     Blank(Box<BlankFeed>),
-    /// Recorded original pictures of a live camera.
+    /// Original pictures of a live camera, read from a recording.
     Recorded(Box<RecordedFeed>),
 }
 
@@ -188,7 +188,7 @@ impl Feed {
         }
     }
 
-    /// Returns true if the source is a video. A decoder leaves out frames that it cannot decode.
+    /// Returns true if the source is a video. The decoder of a video leaves out frames that it cannot decode.
     pub fn is_video(&self) -> bool {
         match self {
             Self::Footage(source) => source.info().kind == SourceKind::Video,
@@ -196,7 +196,7 @@ impl Feed {
         }
     }
 
-    /// Returns the complaints of a video's decoder so far.
+    /// Returns the error messages of a video's decoder so far.
     pub fn complaints(&self) -> Complaints {
         match self {
             Self::Footage(source) => source.complaints(),
@@ -250,7 +250,7 @@ impl Stage {
     }
 }
 
-/// Parses the address of grey footage. Returns `None` if the source is something else.
+/// Parses a `blank://` URL. Returns `None` if the source is something else.
 fn blank(spec: &SourceSpec) -> Result<Option<Blank>, FeedError> {
     if !Blank::is_blank(&spec.path) {
         return Ok(None);

@@ -2,8 +2,8 @@
 
 use messages::Status;
 
-/// Largest difference between a frame's time and the time expected from the previous frame. Recordings have gaps, and a
-/// camera may be slow for a moment: neither counts as a clock jump.
+/// Largest difference between a frame's time and the time expected from the previous frame. It is so large that gaps in a recording and
+/// short delays of a camera do not count as clock jumps.
 const JUMP_S: f64 = 2.0;
 
 /// Keeps the state of a camera's last frame, to check the next frame. Does not read a clock.
@@ -45,7 +45,7 @@ impl Guard {
         time_s: Option<f64>,
         pixels: &[u8],
     ) -> Option<Status> {
-        // Both checks must see every frame.
+        // Both checks need every frame, so neither is skipped if the other one fails.
         let of_picture = self.picture(pixels);
         let of_clock = time_s.and_then(|time_s| self.clock(index, time_s));
         of_clock.or(of_picture)
@@ -82,7 +82,7 @@ impl Guard {
     }
 }
 
-/// Returns a hash of all bytes, to distinguish pictures. It has four independent lanes, so it is faster than a copy.
+/// Returns a hash of all bytes, to distinguish pictures. It computes four independent hashes in parallel, so it is faster than a copy.
 fn fingerprint(bytes: &[u8]) -> u64 {
     const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut lanes = [1, 2, 3, 4].map(|i: u64| i.wrapping_mul(PRIME));

@@ -16,18 +16,18 @@ pub struct Job {
     pub view: usize,
     /// Footage of the camera.
     pub source: SourceSpec,
-    /// For cameras with clocks of their own: the frame that belongs to each common instant. `source` then counts instants.
+    /// For cameras with clocks of their own: the frame that belongs to each common instant (a time at which all cameras should take a
+    /// picture). `source` then counts instants.
     pub timeline: Option<Timeline>,
-    /// The live camera, if the camera is live. Only the choice of frames in `source` is then used.
+    /// Settings of the camera if it is live. In this case, only the choice of frames in `source` is used.
     pub live: Option<LiveJob>,
-    /// Time from the beginning of the run to the first frame in real time, in nanoseconds. By then every process has started.
+    /// Time from the beginning of the run to the first frame in real time, in nanoseconds. It is long enough for every process to start.
     pub lead_nanos: u64,
     /// Faults to simulate.
     pub faults: Faults,
     /// Number of repetitions from which a picture counts as frozen; 0 to disable the check.
     pub frozen_after: u32,
-    /// Time from the instant of a frame until the picture of the footage was taken, in nanoseconds. For a live camera, it is
-    /// measured.
+    /// Time from the nominal time of a frame until its picture was taken, in nanoseconds. It is measured if the camera is live.
     pub skew_nanos: i64,
     /// Mapping from the footage to the frames of the pipeline.
     pub framing: Framing,

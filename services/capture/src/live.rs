@@ -1,9 +1,8 @@
-//! A live camera, whose pictures are assigned to the common instants of all cameras in a run.
+//! A live camera. Its pictures are assigned to instants: the nominal frame times, which all cameras of a run share.
 //!
-//! Reading order: [`LiveCamera`] (the camera to open), `input` (an open device or stream), `originals` (its
-//! original pictures, for a recording), `source` (the thread that keeps
-//! it open, and the newest pictures), `grid` (the instant that a picture belongs to), `phase` (how far
-//! pictures are from their instants).
+//! Reading order: [`LiveCamera`] (the camera to open), `input` (an open device or stream), `originals` (its original pictures, for a
+//! recording), `source` (the thread that keeps it open, and the newest pictures), `grid` (the instant that a picture belongs to), `phase`
+//! (how much the times of pictures differ from their instants).
 
 mod address;
 mod clock;
@@ -34,8 +33,8 @@ pub struct LiveJob {
     pub is_kept: bool,
     /// Name of the camera.
     pub name: String,
-    /// Largest distance of pictures from the instants without a warning, in nanoseconds.
+    /// Largest difference between the times of pictures and their instants that causes no warning, in nanoseconds.
     pub max_skew_nanos: u64,
-    /// Time from the beginning of the run to the first instant, in nanoseconds. It is the same for all cameras of the run.
+    /// Time from the beginning of the run to the first common instant of the cameras, in nanoseconds. It is the same for all cameras.
     pub lead_nanos: u64,
 }

@@ -12,13 +12,13 @@ use crate::job::Job;
 use crate::kept::Kept;
 use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
-/// Time after an instant for which its picture is awaited. Two periods are added to this time.
+/// Time for which the process waits for the picture of an instant. Two frame periods are added to it.
 const PATIENCE_NANOS: u64 = 250_000_000;
 /// Longest wait for a picture, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Number of pictures after which the rate of a camera is compared with the rate of the instants.
+/// Number of pictures after which the rate of a camera is compared with the frame rate of the run.
 const N_FOR_RATE: u64 = 100;
-/// Largest accepted difference between the rate of a camera and the rate of the instants, as a share.
+/// Largest accepted difference between the rate of a camera and the frame rate of the run, as a fraction of the latter.
 const RATE_TOLERANCE: f64 = 0.02;
 
 /// Sends the pictures of a live camera to their topic.
@@ -89,7 +89,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     if let Some(kept) = &mut kept {
         kept.end()?;
     }
-    // Pictures that still wait have no instant left.
+    // All instants of the run have passed, so waiting pictures are discarded.
     while let Some(picture) = it.source.next(Duration::ZERO) {
         it.counts.n_surplus += 1;
         it.source.give_back(picture);
@@ -107,7 +107,7 @@ impl Live<'_, '_> {
         self.job.source.start + nth.saturating_mul(self.job.source.step)
     }
 
-    /// Sends a picture at its instant. Earlier instants without a picture are reported as left out.
+    /// Sends a picture at its instant. Earlier instants that have no picture are reported as left out.
     fn take(&mut self, picture: &Picture, n_frames: u64) -> Result<(), Failure> {
         if let Some(why) = self.grid.wrong_clock(picture.at_nanos, picture.arrived_at_nanos) {
             (self.refused, self.counts.n_refused) = (Some(why), self.counts.n_refused + 1);
@@ -118,7 +118,7 @@ impl Live<'_, '_> {
             self.counts.n_surplus += 1;
             return Ok(());
         };
-        // Overtaken pictures count as dropped, like footage that is behind its clock.
+        // Pictures that were replaced by newer ones count as dropped, like frames of footage that are sent too late.
         let n_dropped = picture.n_overtaken.min(nth.saturating_sub(self.at));
         if n_dropped > 0 {
             self.camera.drop_frames(n_dropped);
@@ -189,7 +189,7 @@ impl Live<'_, '_> {
         }
     }
 
-    /// Logs that there are pictures again, if it was logged that they were missing.
+    /// Logs that the camera delivers pictures again, if their absence was logged.
     fn say_that_it_is_back(&mut self, index: u64) {
         if self.trouble.take().is_some() && core::mem::take(&mut self.has_said) {
             tracing::info!(
@@ -205,7 +205,7 @@ impl Live<'_, '_> {
         self.camera.note(self.at);
     }
 
-    /// Gives up instants whose picture is overdue. If the camera is known to be gone, gives them up at once.
+    /// Gives up instants whose picture is overdue. If the camera is known to be disconnected, does not wait for pictures.
     fn give_up_overdue(&mut self, n_frames: u64) -> Result<(), Failure> {
         let trouble = self.source.trouble();
         let patience = match trouble {
@@ -219,7 +219,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Logs once if pictures are too far from their instants.
+    /// Logs once if pictures are taken too long before or after their instants.
     fn warn_of_skew(&mut self) {
         let Some(skew) = self.phase.skew_nanos() else {
             return;

@@ -47,7 +47,7 @@ pub enum RecordedError {
         /// Cameras whose pictures the recording has.
         known: Vec<String>,
     },
-    /// The recorded facts about the camera's pictures contradict each other.
+    /// The recorded metadata of the camera's pictures is inconsistent.
     #[error("the recorded pictures of camera {camera:?} cannot be used: {what}")]
     Malformed {
         /// Name of the camera.
@@ -192,7 +192,7 @@ impl RecordedFeed {
         n
     }
 
-    /// Decodes a picture that does not depend on another picture. Returns `false` if it is damaged.
+    /// Decodes a picture that can be decoded on its own. Returns `false` if it is damaged.
     fn decode(&mut self, picture: &Picture) -> Result<bool, FootageError> {
         let (file, buffer) = (&mut self.file, &mut self.buffer);
         let message = match recording::read(file, Kind::Picture, &picture.entry, buffer) {

@@ -22,12 +22,12 @@ struct Times {
     n_instants: u64,
     /// Position of the next instant among the used instants.
     at: u64,
-    /// Index of the next frame from the footage. `shown` is the index of the last frame.
+    /// Index of the next frame that the footage delivers. `shown` is the index of the last delivered frame.
     next: u64,
     shown: Option<u64>,
 }
 
-/// Returns the whole footage, from a frame on.
+/// Returns a specification of the whole footage, starting at a frame.
 fn whole(spec: &SourceSpec, from: u64) -> SourceSpec {
     SourceSpec {
         start: from,
@@ -130,7 +130,8 @@ impl Retimed {
         Ok(n)
     }
 
-    /// Returns the next picture. If the footage lacks frames, the picture belongs to a later instant. Returns `None` at the end.
+    /// Returns the next picture. If frames are missing in the footage, this picture may belong to a later instant. Returns `None` at the
+    /// end.
     ///
     /// # Errors
     ///

@@ -155,7 +155,7 @@ impl Supply {
         step
     }
 
-    /// Logs the complaints of the decoder once.
+    /// Logs the error messages of the decoder once.
     fn complain(&mut self) {
         let Some(feed) = self.feed.take() else { return };
         let complaints = feed.complaints();
@@ -180,7 +180,7 @@ impl Supply {
                 wrong.map_or(Step::Picture, Step::Nothing)
             }
             Read::LeftOut => {
-                // A slow camera leaves out frames, and so does a video decoder that cannot decode them.
+                // Frames are missing if a camera is slow, or if a video decoder cannot decode them.
                 let is_video = self.feed.as_ref().is_some_and(Retimed::is_video);
                 let cause = if is_video {
                     Status::DAMAGED
@@ -238,7 +238,7 @@ impl Supply {
         Ok(feed.next_frame()?.map(|frame| (frame.index, frame.time_s)))
     }
 
-    /// Handles the early end of a source. For a live camera, this is a failure.
+    /// Handles a source that ends early, which is a failure if the camera is live.
     fn at_end(&self) -> Result<Read, FootageError> {
         if !self.is_live {
             return Ok(Read::Over);
@@ -278,7 +278,7 @@ impl Supply {
         fault.is_some_and(|fault| (index - fault.from) / self.spec.step % 2 == 1)
     }
 
-    /// Skips a frame and keeps the last picture.
+    /// Skips a frame of the feed, so that the last picture is repeated.
     fn freeze(&mut self) -> Result<Read, FootageError> {
         if self.held.is_none() {
             self.held = Some(self.pixels().to_vec());
@@ -331,7 +331,7 @@ impl Supply {
         let feed = match Retimed::open(&spec, self.timeline.as_ref()) {
             Ok(feed) => feed,
             Err(FeedError::Footage(error)) => return Err(error),
-            // A scene that was created once can be created again, unless its files are gone.
+            // A scene could be created before, so creating it again fails only if its files have been removed.
             Err(
                 FeedError::Address { address, .. }
                 | FeedError::Blank { address, .. }
@@ -349,7 +349,7 @@ impl Supply {
         Ok(true)
     }
 
-    /// Records a failure, and closes the source. Its next frame is then unknown.
+    /// Records a failure, and closes the source, whose position is then unknown.
     fn lose(&mut self, error: &FootageError, now: u64) {
         let cause = cause_of(error);
         if self.feed.is_some() || self.cause != cause {

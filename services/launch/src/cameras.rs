@@ -22,7 +22,7 @@ pub struct Footage {
     pub n_frames: u64,
     /// Rate of the used frames, per second of the scene, if known.
     pub frame_rate_hz: Option<f64>,
-    /// For cameras with clocks of their own: the frame that belongs to each common instant. The frames of the run are then instants.
+    /// For cameras with clocks of their own: the frame of the footage that belongs to each frame of the run.
     pub timeline: Option<Timeline>,
 }
 

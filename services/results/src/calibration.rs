@@ -1,5 +1,5 @@
-//! Checks the cameras with the poses that every view found on its own. A camera must be where the calibration says, and its pictures must
-//! have been taken at their stated times.
+//! Checks, by the poses that each view found on its own, that every camera is at its calibrated pose, and that its pictures were taken at
+//! their stated times.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,8 @@ impl Calibration {
         }
         let points: Vec<_> =
             (0..scene.views.len()).map(|view| parts(scene, record, view)).collect();
-        // In an empty room, networks see false people at different positions in each view, which is not the fault of a camera.
+        // In an empty room, a network's false detections are in different places in different views. Their disagreement does not show that
+        // a camera is wrong.
         let is_there = |person: &SkeletonMessage| person.status == Status::OK;
         if !scene.has_maps || record.followed().is_some_and(is_there) {
             self.watch.note(&points);
@@ -57,8 +58,8 @@ impl Calibration {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
             fit.without_px = self.watch.without_px(view).map(|value| value * scale);
-            // If the footage of two cameras is exchanged, every camera contradicts the calibration. A late camera also contradicts it
-            // while a person walks. A moved camera does not look late.
+            // If the footage of two cameras was swapped, every camera contradicts the calibration. So does a camera whose pictures are
+            // late, while a person walks. A camera that was moved does not look late.
             let is_named =
                 self.watch.is_reported(view) && self.exchanged.is_none() && !fit.out_of_step;
             if is_named && !fit.suspected {
@@ -73,7 +74,7 @@ impl Calibration {
         }
     }
 
-    /// Estimates the delay of every camera, and logs once if a camera is out of step.
+    /// Estimates the delay of every camera, and logs once if a camera is not synchronised with the others.
     fn follow_steps(
         &mut self,
         scene: &Scene,
@@ -94,7 +95,7 @@ impl Calibration {
             let step = self.steps.step(view);
             fit.offset_ms = step.map(|step| step.offset_ms);
             fit.offset_error_ms = step.map(|step| step.error_ms);
-            // If the footage of two cameras is exchanged, no delay fits.
+            // If the footage of two cameras was swapped, no delay explains the contradictions.
             let is_named = self.steps.is_reported(view) && self.exchanged.is_none();
             if is_named && !fit.out_of_step {
                 tracing::warn!(
@@ -108,7 +109,7 @@ impl Calibration {
         }
     }
 
-    /// Looks for two cameras whose footage is exchanged, and logs the two cameras once.
+    /// Looks for two cameras whose footage was swapped (each has the other's pictures), and logs them once.
     fn find_exchanged(&mut self, scene: &Scene) {
         let Some(it) = self.swaps.swap().filter(|_| self.exchanged.is_none()) else {
             return;
@@ -149,7 +150,7 @@ impl Calibration {
         );
     }
 
-    /// Returns the contradiction between the cameras, unless it is explained by two exchanged cameras.
+    /// Returns the contradiction between the cameras, unless two cameras with swapped footage explain it.
     ///
     /// * `names`: names of the views, in their order.
     pub(crate) fn contradicted(&self, names: impl Iterator<Item = String>) -> Option<Contradicted> {
@@ -163,7 +164,7 @@ impl Calibration {
         })
     }
 
-    /// Returns the two cameras that look exchanged.
+    /// Returns the two cameras whose footage seems to be swapped.
     pub(crate) fn exchanged(&self) -> Option<&Exchanged> {
         self.exchanged.as_ref()
     }
@@ -176,19 +177,19 @@ impl Calibration {
     }
 }
 
-/// Returns the parts of a view's own best candidate, named by the side of the body, in pixels of the frame. Returns `None` if the view sees
-/// nobody well.
+/// Returns the parts of a view's own best candidate, in pixels of the frame, with left and right as seen by the person. Returns `None` if
+/// the view does not see a person clearly.
 fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
     let fused = record.fused(view);
-    // With maps of networks, fusion leaves out a view that contradicts the others. Such views must be checked, so this is no reason to
-    // skip the view.
+    // With maps of networks, fusion leaves out views that contradict the others. These are the views that must be checked, so a view that
+    // was left out is not skipped here.
     if fused.is_none() && !scene.has_maps {
         return None;
     }
     let readings = own::readings(scene, record, view)?;
     let is_exchanged = match fused {
         Some(fused) if !scene.has_maps => fused.exchanged == 1,
-        // Networks name sides as they see them. The solution in space shows which side is the person's left.
+        // Networks may confuse left and right. The 3D solution shows which side is the person's left.
         _ => own::is_exchanged(scene, record, view, &readings),
     };
     let [named, exchanged] = readings;

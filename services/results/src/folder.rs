@@ -35,7 +35,7 @@ pub struct Folder {
 impl Folder {
     /// Opens a folder, and creates it if it does not exist.
     ///
-    /// * `resume`: true to continue where a killed process stopped, instead of starting again.
+    /// * `resume`: true to continue where a killed process stopped, instead of starting over.
     ///
     /// # Errors
     ///
@@ -53,7 +53,7 @@ impl Folder {
         })
     }
 
-    /// Returns true if a run has finished all its files there, under their final names.
+    /// Returns true if a run has finished all its files in the folder, under their final names.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
         let text =
             files::read_text(&dir.join(RunSummary::FILE), files::SETTINGS).unwrap_or_default();
@@ -80,7 +80,7 @@ impl Folder {
         Ok(file)
     }
 
-    /// Reserves space for a file that is written at the end, when the disk may be full.
+    /// Reserves space for a file that is written at the end of the run, because the disk may be full by then.
     ///
     /// # Errors
     ///

@@ -10,7 +10,7 @@ use pipeline::Sighting;
 
 use crate::{Missing, Scene};
 
-/// The messages of one view about one frame; `None` if a message did not come.
+/// The messages of one view about one frame; `None` for a message that was not received.
 #[derive(Debug, Clone, Default)]
 pub struct ViewRecord {
     /// The frame itself, without its pixels.
@@ -21,7 +21,7 @@ pub struct ViewRecord {
     pub quality: Option<ViewQuality>,
     /// Pixels of the frame, if a picture is to be drawn.
     pub picture: Option<Picture>,
-    /// Reason why the view has no part in the result, if it has none.
+    /// Reason why the view did not contribute to the result, if it did not.
     pub missing: Option<Missing>,
 }
 
@@ -41,7 +41,7 @@ pub struct Absent {
     pub frame: u64,
     /// Reason why there is no result.
     pub reason: String,
-    /// For every view, the reason why it would have had no part in the result.
+    /// For every view, the reason why it could not have contributed to the result.
     pub views: Vec<Missing>,
 }
 
@@ -94,8 +94,8 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// Returns the followed person; `None` if there is nobody. Candidates of views have no identities, so the best candidate of each view
-    /// is compared with this person.
+    /// Returns the followed person; `None` if there is nobody. Candidates of views have no identities, so this person is the one with whom
+    /// the best candidate of each view is compared.
     pub fn followed(&self) -> Option<&SkeletonMessage> {
         self.skeletons.followed()
     }
@@ -135,8 +135,8 @@ impl FrameRecord {
         })
     }
 
-    /// Returns the candidate of a view that is the followed person, as far as the view itself can tell. With the filters, this is the best
-    /// candidate. With a network, it is the candidate closest to the fused person, or the largest candidate if fusion left out the view.
+    /// Returns the candidate of a view that is probably the followed person. With the filters, this is the best candidate. With a network,
+    /// it is the candidate closest to the fused person, or the largest candidate if fusion left out the view.
     pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Own> {
         let candidates = self.candidates(scene, view);
         if !scene.has_maps || candidates.len() < 2 {
@@ -173,7 +173,7 @@ impl FrameRecord {
     }
 }
 
-/// The pose of one person that a view found alone.
+/// The pose of one person, found from a single view.
 #[derive(Debug, Clone)]
 pub(crate) struct Own {
     /// The parts of the body in pixels of the frame, with the side names of the view. A part that is not seen is NaN.

@@ -30,7 +30,7 @@ pub(crate) struct Gather {
     is_resumed: bool,
 }
 
-/// Frames that are complete once a result has been received.
+/// Frames that are complete because a result has been received.
 #[derive(Debug)]
 pub(crate) struct Settled {
     /// Earlier frames without a result, in order.
@@ -107,8 +107,8 @@ impl Gather {
         }
     }
 
-    /// Returns true if expected errors of a frame will still arrive. Fusion has used them, but their sender serves one receiver after
-    /// another.
+    /// Returns true if expected errors of a frame are still to arrive. Their sender serves one receiver after another, so fusion may have
+    /// received and used them before this process does.
     pub(crate) fn awaits_quality(&self, frame: u64) -> bool {
         let Some(parts) = self.frames.get(&frame) else {
             return false;
@@ -352,7 +352,7 @@ mod tests {
     fn frames_after_the_last_result_are_listed_up_to_the_end_of_footage() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.result(skeletons(0)).unwrap();
-        // The pose of frame 1 came too late. There is no pose of frame 2, and no pose of the other view.
+        // One view's pose of frame 1 came too late, and its pose of frame 2 is missing. The other view has no poses.
         gather.pose(0, &pose(1));
         for (view, end) in [(0, 3), (1, 2)] {
             let mut last = pose(end);

@@ -7,7 +7,7 @@ use messages::{FusedView, MAX_PARTS, Skeletons, Status};
 
 use crate::Scene;
 
-/// Minimum number of poses of a view before its median height is judged.
+/// Number of poses of a view from which its median height is judged.
 const MIN_POSES: u64 = 20;
 
 /// Counts the heights of people, by view.

@@ -1,8 +1,8 @@
-//! Reasons why a view has no part in a result.
+//! Reasons why a view does not contribute to a result.
 
 use messages::{FrameHeader, Status, ViewPose};
 
-/// Reason why a view has no part in a result.
+/// Reason why a view does not contribute to a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Missing {
     /// The view sent a message without a pose: no person was found, or there was no frame.
@@ -97,7 +97,7 @@ impl ViewHistory {
         self.ports = ports;
     }
 
-    /// Processes a result, and returns the reason why the view would have no part in it.
+    /// Processes a result, and returns the reason why the view could not contribute to it.
     ///
     /// * `pose`: the view's message about that frame.
     /// * `is_first`: true if this is the first result of a restarted process.

@@ -42,7 +42,7 @@ pub struct Output {
     smoothing: Option<Smoothing>,
 }
 
-/// Error when starting the output.
+/// Error if the output cannot be started.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// A file cannot be created.
@@ -57,7 +57,7 @@ pub enum OutputError {
 }
 
 impl Output {
-    /// Starts the files of a run. Space for the files that are written at the end is reserved now.
+    /// Starts the files of a run, and reserves space for the files that are written at the end.
     ///
     /// * `n_workers`: number of fusion processes, for the latency of each.
     /// * `folder`: the output folder. If it is resumed, the files of a killed process are continued.

@@ -12,8 +12,8 @@ const SAME_PERSON_M: f64 = 0.25;
 /// Maximum distance of a joint that is counted, in metres. Larger distances count as this value.
 const MOST_M: f64 = 0.3;
 
-/// Returns the parts of a view's best candidate in pixels of the frame, once with the sides as named by the network or filters, and once
-/// with exchanged sides. Returns `None` if the view has no candidate, or is not sure enough of it.
+/// Returns the parts of a view's best candidate in pixels of the frame, once with left and right as named by the network or filters, and
+/// once with left and right swapped. Returns `None` if the view has no candidate, or is not sure enough of it.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,
@@ -26,7 +26,7 @@ pub(crate) fn readings(
     Some([named.clone(), exchanged.unwrap_or(named)])
 }
 
-/// Returns true if the parts of a view fit the solution better with exchanged sides.
+/// Returns true if the parts of a view fit the solution better if left and right are swapped.
 pub(crate) fn is_exchanged(
     scene: &Scene,
     record: &FrameRecord,
@@ -40,8 +40,8 @@ pub(crate) fn is_exchanged(
     sum(&readings[1]) < sum(&readings[0])
 }
 
-/// Returns the distances of the views' joints from the joints of the solution, in metres at their depth, each at most 0.3. Only views that
-/// show the same person are used. If fewer than two views do, all views are used.
+/// Returns the distances of the views' joints from the joints of the solution, converted from pixels to metres at the depth of the joint
+/// and limited to 0.3 each. Only views that show the same person are used or, if there are fewer than two of these, all views.
 pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     let of_view = |view: usize| {
         let readings = readings(scene, record, view)?;

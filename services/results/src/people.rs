@@ -9,7 +9,7 @@ use runfiles::{People, PersonLine, PersonSummary};
 use crate::pose3d::is_placed;
 use crate::trust::Trusted;
 
-/// Number of results with other people before this is logged. Fewer frames may be a false detection.
+/// Number of results with other people from which they are reported. In fewer frames, another person may be a false detection.
 const MANY: u64 = 10;
 /// After an absence of this time, in seconds, a person gets a new id. The crate `people` forgets a person after a minute.
 pub(crate) const GONE_S: f64 = 61.0;

@@ -7,8 +7,8 @@ use runfiles::{FrameLine, JointLine, Kept, PersonLine, PlacedJoint, Sides};
 
 use crate::{Absent, FrameRecord, Scene};
 
-/// First line of `pose3d.csv`. Then follows one row per joint of a person, with empty cells if there is no position. A frame with nobody
-/// has one row per joint, without a person.
+/// First line of `pose3d.csv`. It is followed by one row per joint of each person, with empty cells for joints without a position. A frame
+/// in which nobody was found has one row per joint, without a person's id.
 pub(crate) const CSV_HEADER: &str = "frame,time_s,person,joint,x_m,y_m,z_m,cov_xx_m2,cov_xy_m2,cov_xz_m2,\
 cov_yy_m2,cov_yz_m2,cov_zz_m2,reprojection_px,views,status";
 
@@ -81,7 +81,7 @@ fn person_line(scene: &Scene, person: &SkeletonMessage) -> PersonLine {
     }
 }
 
-/// Returns the line of a frame without a result: the reason, and for every view the reason why it has no part in the result.
+/// Returns the line of a frame without a result: the reason, and for every view the reason why it does not contribute to the result.
 pub(crate) fn absent_line(scene: &Scene, it: &Absent) -> FrameLine {
     let views = scene.views.iter().enumerate();
     let why = |view: usize| it.views.get(view).map_or(it.reason.as_str(), |view| view.reason());
@@ -105,7 +105,7 @@ fn finite(number: f64) -> Option<f64> {
     Some(number).filter(|value| value.is_finite())
 }
 
-/// Returns a person without joints, for the rows of a frame with nobody.
+/// Returns a person without joints, for the rows of a frame in which nobody was found.
 ///
 /// * `status`: status of the frame.
 pub(crate) fn nobody(scene: &Scene, status: Status) -> SkeletonMessage {
@@ -128,7 +128,7 @@ pub(crate) fn nothing(frame: u64) -> Box<Skeletons> {
     nothing
 }
 
-/// Returns the views that have no part in the result, with the reasons.
+/// Returns the views that do not contribute to the result, with the reasons.
 pub(crate) fn missing<'a>(
     scene: &'a Scene,
     record: &FrameRecord,

@@ -63,8 +63,8 @@ impl Smoothing {
         })
     }
 
-    /// Smooths the joints of all people in a frame, and writes the frame's line. If frames have no times, 30 Hz is assumed. The delay
-    /// in the report is then wrong by the same factor as the rate.
+    /// Smooths the joints of all people in a frame, and writes the frame's line. If frames have no times, a rate of 30 Hz is assumed. If
+    /// the true rate differs, the delay in the report is wrong by the same factor.
     pub(crate) fn frame(&mut self, line: &FrameLine) -> io::Result<()> {
         let time_s = line.time_s.unwrap_or(line.frame as f64 / 30.0);
         let there: Vec<u64> = line.people.iter().map(|person| person.id).collect();

@@ -9,18 +9,18 @@ use runfiles::{Doubt, Trust};
 use crate::height::height_px;
 use crate::pose3d::is_placed;
 
-/// Step in which lengths of bones are counted, in metres.
+/// Width of a bin of the histogram of bone lengths, in metres.
 const LENGTH_STEP_M: f64 = 0.001;
-/// Longest length that is distinguished, in metres. Longer bones count as this length.
+/// Upper end of the histogram of bone lengths, in metres. Longer bones are counted in the last bin.
 const LONGEST_M: f64 = 1.0;
-/// Maximum movement of the middle of a body between two results, in metres.
+/// Movement of the middle of a body between two results from which the result is doubtful, in metres.
 const FARTHEST_M: f64 = 0.5;
 /// Maximum speed of the middle of a body between two results, in metres per second.
 const FASTEST_M_S: f64 = 6.0;
 /// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
 const SD_PER_MAD: f64 = 1.4826;
 
-/// Step in which deviations of bodies are counted, in standard deviations.
+/// Width of a bin of the histogram of body deviations, in standard deviations.
 const STEP: f64 = 0.05;
 
 /// Collects evidence for and against the results.
@@ -34,7 +34,7 @@ pub(crate) struct Trusted {
     n_joints_implausible: u64,
     /// Number of bodies by their deviation, in units of [`STEP`].
     deviations: BTreeMap<u32, u64>,
-    /// Sum of the squared errors, as shares of the person's height, and number of errors.
+    /// Sum of the squared errors, as fractions of the person's height, and number of errors.
     squared: (f64, u64),
     /// Sum of the distances of the views' joints from the result, in metres, and number of distances.
     distances: (f64, u64),
@@ -144,14 +144,14 @@ impl Trusted {
         self.last = Some((now_s, middle));
     }
 
-    /// Returns the scatter of the lengths of the bones, in metres.
+    /// Returns the scatter (standard deviation) of the bone lengths, in metres.
     fn bone_scatter_m(&self) -> Option<f64> {
         let scatters: Vec<f64> =
             self.lengths.values().filter_map(|value| scatter_m(value)).collect();
         (!scatters.is_empty()).then(|| scatters.iter().sum::<f64>() / scatters.len() as f64)
     }
 
-    /// Returns the trust so far.
+    /// Returns the verdict so far.
     pub(crate) fn trust(&self) -> Trust {
         let share = |n: u64, of: u64| n as f64 / of.max(1) as f64;
         let (sum, n) = self.squared;
@@ -205,7 +205,7 @@ fn scatter_m(counts: &[u32]) -> Option<f64> {
     Some(SD_PER_MAD * deviation as f64 * LENGTH_STEP_M)
 }
 
-/// Returns the mean height of the person in the used views, in pixels of their frames.
+/// Returns the mean height of the person over the used views, in pixels of their frames.
 fn mean_height_px(pose: &SkeletonMessage) -> Option<f64> {
     let views = pose.listed_views().iter().enumerate();
     let used = views.filter(|(view, _)| pose.views_used >> view & 1 == 1);

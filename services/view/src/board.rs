@@ -1,4 +1,4 @@
-//! The newest content for the pages. One thread updates it; every page takes the messages that it has not received yet.
+//! The newest content for the pages. One thread updates it. Every page fetches the messages that it has not received yet.
 
 use std::collections::VecDeque;
 use std::io;
@@ -57,7 +57,7 @@ struct Inner {
     pictures: [Slot; MAX_VIEWS],
     events: VecDeque<(u64, Message)>,
     scene: Option<Arc<Scene>>,
-    /// Event files that are signalled after every change.
+    /// Event file descriptors (`eventfd`) that are signalled after every change.
     bells: Vec<Weak<OwnedFd>>,
     /// Request to start or end a recording, for the thread that follows the deployment.
     record: Option<bool>,
@@ -65,7 +65,7 @@ struct Inner {
     recorder: Option<usize>,
 }
 
-/// A message to all pages, and the number of the change that added it.
+/// A message to all pages, with the sequence number of the change that added it.
 #[derive(Debug, Clone, Default)]
 struct Slot {
     version: u64,
@@ -83,7 +83,7 @@ impl Board {
         }
     }
 
-    /// Shows another run, or the message that no run exists. Content of the previous run is removed.
+    /// Shows a new run, or the message that there is no run. The content of the previous run is removed.
     pub(crate) fn begin(&self, hello: &Value, scene: Option<Arc<Scene>>) {
         self.change(|inner, version| {
             inner.hello = Slot::new(version, text(hello));

@@ -42,7 +42,7 @@ impl Companion {
         command
             .args(["view", "--deployment", name, "--with-parent", "--port"])
             .arg(port.to_string())
-            // The view ends when this pipe is closed. Ctrl-C must only reach the run.
+            // The view ends when this pipe is closed. It must not receive Ctrl-C, which is meant for the run.
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .process_group(0);

@@ -68,12 +68,12 @@ fn wait(listener: &TcpListener, stop: &Stop) {
     }
 }
 
-/// One of a limited number of places; dropping it frees the place.
+/// One of a limited number of open connections or pages. Dropping it makes room for another one.
 #[derive(Debug)]
 pub(crate) struct Seat(Arc<AtomicUsize>);
 
 impl Seat {
-    /// Takes a place, if fewer than `most` are taken.
+    /// Takes a place, if fewer than `most` places are taken.
     pub(crate) fn take(taken: &Arc<AtomicUsize>, most: usize) -> Option<Self> {
         let more = |n: usize| (n < most).then_some(n + 1);
         let before = taken.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more);

@@ -1,4 +1,4 @@
-//! A finished run for display frame by frame, from its folder or its recording.
+//! A finished run, which is shown frame by frame from its folder or its recording.
 
 mod folder;
 mod tape;

@@ -1,9 +1,9 @@
-//! A page in the browser that shows a deployment while it runs, or a finished run. It shows the skeleton in space with its
-//! uncertainty, the pictures of all cameras, rates, latency, missing processes, and errors.
+//! A page in the browser that shows a deployment while it runs, or a finished run. It shows the skeleton in space with its uncertainty, the
+//! pictures of all cameras, rates, latency, missing processes, and errors.
 //!
-//! A thread follows the deployment ([`runtime::Bus::as_onlooker`]) and puts the newest messages on a board. Every open page has a
-//! thread that sends the new messages from the board. Therefore no process of the deployment waits for a page, and a slow page misses
-//! frames. The memory does not grow with the number of frames or with the messages that a page does not take.
+//! A thread follows the deployment ([`runtime::Bus::as_onlooker`]) and puts the newest messages on a board. Every open page has a thread
+//! that sends the new messages from the board. Therefore no process of the deployment waits for a page, and a slow page misses frames.
+//! Memory use does not grow with the number of frames, or when a page does not fetch its messages.
 //!
 //! | part | module |
 //! |---|---|

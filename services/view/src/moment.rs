@@ -16,7 +16,7 @@ pub(crate) struct Moment {
     pub at: Option<usize>,
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// Time of the frame in seconds after frame 0; `None` if unknown.
+    /// Time of the frame, in seconds after frame 0; `None` if unknown.
     pub seconds: Option<f64>,
     /// Reason for a missing skeleton; `None` if there is a skeleton.
     pub why: Option<String>,
@@ -56,7 +56,7 @@ pub(crate) struct Other {
 pub(crate) struct Seen {
     /// Joints, in pixels; `None` if there is no pose.
     pub joints: Option<Vec<[f64; 2]>>,
-    /// Reason why the view has no part in the result; `None` if it has one.
+    /// Reason why the view does not contribute to the result; `None` if it does.
     pub why: Option<String>,
     /// True if the view sees the person from behind.
     pub behind: bool,

@@ -24,7 +24,7 @@ pub(crate) struct Scene {
     pub up: [f64; 3],
     /// Frames per second of the footage; `None` if unknown.
     pub frame_rate_hz: Option<f64>,
-    /// True if results state which views see the person from behind. This is the case for results of the filters.
+    /// True if results state which views see the person from behind. Only results of the filters do.
     pub tells_facing: bool,
     /// Reason why the cameras are unknown; `None` if they are known.
     pub problem: Option<String>,
@@ -69,8 +69,7 @@ impl Scene {
         })
     }
 
-    /// Creates the same scene as `of_frames`. If the cameras cannot be read, it has none, so that a run can be shown without its
-    /// calibration.
+    /// Creates the same scene as `of_frames`, but without cameras if the calibration cannot be read. The run can then still be shown.
     pub(crate) fn of_finished(resolved: &Resolved) -> Self {
         Self::of_frames(resolved).unwrap_or_else(|why| {
             let cameras = resolved.deployment.cameras.iter().zip(&resolved.footage);

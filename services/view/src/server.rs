@@ -25,7 +25,7 @@ pub(crate) const MOST_PAGES: usize = 64;
 
 const INDEX: &str = include_str!("../page/index.html");
 const STYLE: &str = include_str!("../page/view.css");
-/// Modules of the page, except the stage, which reports use too.
+/// Modules of the page, except the module `stage`, which reports use as well.
 const MODULES: [(&str, &str); 4] = [
     ("/view.js", include_str!("../page/view.js")),
     ("/pictures.js", include_str!("../page/pictures.js")),
@@ -118,7 +118,7 @@ fn token_in(query: Option<&str>) -> &str {
     tokens.next().unwrap_or_default()
 }
 
-/// Compares tokens in a time that does not reveal the number of correct characters.
+/// Compares tokens in constant time, so that the time does not reveal how many characters are correct.
 fn is_same(token: &str, other: &str) -> bool {
     let differences = token.bytes().zip(other.bytes());
     let differences = differences.fold(0, |sum, (a, b)| sum | (a ^ b));

@@ -235,7 +235,7 @@ impl Page {
     }
 }
 
-/// Reads a frame of a finished run and its pictures. The frame is last and completes the response.
+/// Reads a frame of a finished run and its pictures. The frame is sent last, and completes the response.
 fn read(finished: &Arc<Finished>, at: usize, shown: &[bool; MAX_VIEWS]) -> Vec<Message> {
     let moment = match finished.moment(at) {
         Ok(moment) => moment,
@@ -321,7 +321,7 @@ mod tests {
         }
     }
 
-    /// Returns the responses to a request. They must be JSON, and only invalid requests are refused.
+    /// Returns the responses to a request, after checking that they are JSON and that only invalid requests are refused.
     fn ask(page: &mut Page, question: &str) -> Vec<Value> {
         let refused_before = page.n_refused;
         let answers = page.answer(question);

@@ -49,7 +49,7 @@ pub(super) struct Times {
     captured_at: u64,
     received_at: u64,
     sent_at: u64,
-    /// Time from the instant of the frame until the picture was taken.
+    /// Time from the nominal time of the frame until the picture was taken.
     skew: i64,
 }
 

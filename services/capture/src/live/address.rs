@@ -22,7 +22,7 @@ pub struct LiveCamera {
     pub controls: BTreeMap<String, i64>,
     /// Transport of an RTSP camera's packets.
     pub transport: Option<Transport>,
-    /// True if the times that an RTSP camera gives for its pictures are used when they are plausible.
+    /// True to use the times that an RTSP camera states for its pictures, as long as they are plausible.
     pub has_own_clock: bool,
 }
 
@@ -41,7 +41,7 @@ pub enum LiveError {
         known()
     )]
     Format {
-        /// Format that was requested, or to which the device is set.
+        /// Requested format, or the current format of the device.
         format: String,
     },
     /// The stream does not give its rate.
@@ -110,7 +110,8 @@ impl LiveCamera {
         }
     }
 
-    /// Returns the size and rate of the pictures. A device is set as requested. A stream is queried, unless both are given.
+    /// Returns the size and rate of the pictures. A device is configured as requested. A stream is queried, unless both size and rate are
+    /// given.
     ///
     /// # Errors
     ///
@@ -134,7 +135,7 @@ impl LiveCamera {
         Ok((size, rate_hz))
     }
 
-    /// Sets a device as requested.
+    /// Configures a device as requested.
     pub(super) fn set(
         &self,
         device: &VideoDevice,

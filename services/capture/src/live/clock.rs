@@ -2,21 +2,21 @@
 
 use std::collections::VecDeque;
 
-/// Time for which an offset is used, in nanoseconds. It is long enough to include a fast packet, and short enough that clocks do not
-/// drift apart.
+/// Length of the window in which the smallest delay is searched, in nanoseconds. It is long enough to contain a packet with little delay,
+/// and so short that clock drift does not matter.
 const WINDOW_NANOS: u64 = 10_000_000_000;
 /// Change of the offset, in nanoseconds, that shows that the camera's clock was set.
 const JUMP_NANOS: u64 = 2_000_000_000;
 
-/// Shortest and longest plausible delay by a camera's clock, in nanoseconds. No picture arrives before it was taken, and a picture that
-/// arrives much later is not awaited.
+/// Shortest and longest plausible delay of a picture according to the camera's clock, in nanoseconds. No picture arrives before it was
+/// taken, and pictures that arrive later than the longest delay are not used.
 const DELAYS_NANOS: [i64; 2] = [0, 150_000_000];
 /// Amount by which a trusted clock may exceed these limits, in nanoseconds, so that a short deviation does not matter.
 const SLACK_NANOS: i64 = 5_000_000;
 /// Number of pictures before the clock of a camera is judged.
 const N_FOR_VERDICT: u32 = 30;
 
-/// Minimum of the numbers of the last ten seconds. Stores times and numbers, both ascending.
+/// Running minimum of the numbers of the last ten seconds. Stores pairs of time and number; both are in ascending order.
 #[derive(Debug, Default)]
 struct Least(VecDeque<(u64, i64)>);
 
@@ -42,13 +42,13 @@ impl Least {
     }
 }
 
-/// Converts presentation times to `CLOCK_MONOTONIC`, using the smallest delay of the last ten seconds. Frames that were delayed
-/// on their way keep their distances.
+/// Converts presentation times to `CLOCK_MONOTONIC`, using the smallest delay of the last ten seconds. The intervals between frames are
+/// kept even if some frames were delayed in transit.
 #[derive(Debug, Default)]
 pub(super) struct ClockMap(Least);
 
 impl ClockMap {
-    /// Returns the time at which a picture was taken, except for the delay that all pictures have. It is never later than the arrival.
+    /// Returns the time at which a picture was taken, plus the delay that all pictures share. It is never later than the arrival.
     ///
     /// * `presented_nanos`: presentation time by the camera's clock.
     /// * `arrived_at_nanos`: time of arrival by this machine's clock.
@@ -65,16 +65,16 @@ pub(super) enum Verdict {
     /// There are too few pictures so far.
     #[default]
     Unknown,
-    /// The clock agrees with this machine's clock.
+    /// The camera's clock agrees with this machine's clock.
     Right,
-    /// The clock differs, or the pictures arrive too late.
+    /// The camera's clock differs from this machine's clock, or the pictures arrive too late.
     Wrong,
 }
 
-/// Judges the clock of a camera that stamps its pictures, by the delays of the pictures.
+/// Judges the clock of a camera that states the times of its pictures, by the delays of the pictures.
 ///
-/// A small error of a clock cannot be distinguished from the transfer time of a picture. With a large error, pictures would seem to come
-/// from the future, or would arrive too late to be awaited.
+/// A small error of a clock cannot be distinguished from the transfer time of a picture. If the error is large, pictures seem to come from
+/// the future, or to arrive too late to be used.
 #[derive(Debug, Default)]
 pub(super) struct OwnClock {
     least: Least,

@@ -1,11 +1,11 @@
-//! The common instants of all cameras in a run, and the assignment of pictures to them.
+//! The instants (nominal frame times) that all cameras of a run share, and the assignment of pictures to them.
 
 use std::collections::VecDeque;
 
 use messages::Status;
 
-/// Distance beyond half a period that a picture may have from its instant, in periods. With this tolerance, pictures that jitter around the
-/// middle between two instants stay with the same instant.
+/// Tolerance by which the time of a picture may differ from its instant by more than half a period, in periods. With this tolerance,
+/// pictures that jitter around the middle between two instants stay with the same instant.
 const SLACK: f64 = 0.1;
 /// Number of intervals whose median is the period of a camera.
 const N_INTERVALS: usize = 15;
@@ -67,8 +67,8 @@ impl Grid {
         at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
 
-    /// Returns the fault in the time of a picture. The time is wrong if it is not later than the time of the previous picture, or far from
-    /// the current time.
+    /// Returns the fault in the time of a picture, if there is one. The time is wrong if it is not later than the time of the previous
+    /// picture, or differs much from the current time.
     pub(crate) fn wrong_clock(&mut self, at_nanos: u64, arrived_at_nanos: u64) -> Option<Status> {
         if at_nanos.abs_diff(arrived_at_nanos) > MAX_OFF_NANOS {
             return Some(Status::CLOCK_JUMPED);
@@ -90,7 +90,7 @@ impl Grid {
         })
     }
 
-    /// Measures the period of the camera from the times of its first pictures, in ascending order.
+    /// Measures the period of the camera from the times of its first pictures, which must be in ascending order.
     pub(crate) fn learn(&mut self, times: impl Iterator<Item = u64>) {
         for at_nanos in times.take(N_INTERVALS + 1) {
             self.wrong_clock(at_nanos, at_nanos);
@@ -98,11 +98,12 @@ impl Grid {
         self.last = None;
     }
 
-    /// Returns the instant that a picture belongs to: `next` or a later one. Returns `None` if all near instants have a picture.
+    /// Returns the index of the instant to which a picture belongs: `next` or a later one. Returns `None` if every instant near the picture
+    /// already has a picture.
     ///
-    /// The distance of a picture from its instant is at most half a period of the instants. If the camera is faster, it is at most half a
-    /// period of the camera. In both cases, a tenth of a period is added as a tolerance. Therefore, cameras with the same rate keep their
-    /// phase, and the nearest picture of a faster camera is used.
+    /// The time of a picture differs from its instant by at most half the interval between instants or, if the camera is faster, half the
+    /// period of the camera, plus a tolerance of a tenth of the period. Therefore, cameras with the same rate keep their phase, and the
+    /// nearest picture of a faster camera is used.
     pub(crate) fn place(&self, at_nanos: u64, next: u64) -> Option<u64> {
         let exact = self.exact(at_nanos);
         let reach = 0.5 * self.own_period().min(1.0) + SLACK;

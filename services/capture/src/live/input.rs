@@ -52,7 +52,7 @@ pub(super) enum Input {
 impl Input {
     /// Opens a camera.
     ///
-    /// * `before`: the device that was open before. It may have another number now.
+    /// * `before`: the device that was open before. Its device number may have changed since.
     /// * `originals`: queue for original pictures, if they are to be kept.
     /// * `is_bare`: see [`StreamSpec::is_bare`].
     pub(super) fn open(
@@ -84,7 +84,7 @@ impl Input {
         }
     }
 
-    /// Returns the properties by which the device is recognised.
+    /// Returns the properties by which the device is recognised when it is connected again.
     pub(super) fn about(&self) -> Option<VideoAbout> {
         match self {
             Self::Device(it) => Some(it.about.clone()),
@@ -92,7 +92,7 @@ impl Input {
         }
     }
 
-    /// Returns a handle with which another thread can end the wait for a picture.
+    /// Returns a handle with which another thread can make this input stop waiting for a picture.
     pub(super) fn end(&self) -> Option<StreamEnd> {
         match self {
             Self::Device(_) => None,
@@ -195,7 +195,7 @@ impl Device {
     }
 }
 
-/// Returns how many numbers are missing between two picture numbers; 0 if the camera has started to count again.
+/// Returns how many numbers are missing between two picture numbers; 0 if the camera has restarted its count.
 fn missing(last: Option<u32>, now: u32) -> u64 {
     let gap = last.map_or(1, |last| now.wrapping_sub(last));
     let is_ahead = (1..1 << 31).contains(&gap);
@@ -235,7 +235,7 @@ pub(super) struct Stream {
     decoder: LiveStream,
     kept: Option<KeptStream>,
     clock: ClockMap,
-    /// The clock of a camera that stamps its pictures; `None` if it is not used.
+    /// The clock of a camera that writes time stamps into its stream; `None` if these are not used.
     own_clock: Option<OwnClock>,
     /// Address without a password.
     address: String,

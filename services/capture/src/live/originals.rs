@@ -8,7 +8,8 @@ use messages::NO_SEQUENCE;
 
 /// Maximum number of waiting bytes: a second of large raw pictures.
 const MAX_BYTES: usize = 128 << 20;
-/// Maximum number of pieces of a stream that wait until the decoder gives their times, and of decoded pictures that are remembered.
+/// Maximum number of pieces of a stream that wait until the decoder gives their times. Also the maximum number of decoded pictures whose
+/// times are remembered.
 const MAX_PENDING: usize = 64;
 /// Tolerance for the time of a piece, which is rounded to milliseconds.
 const SAME_NANOS: u64 = 1_000_000;
@@ -167,8 +168,8 @@ impl KeptStream {
         }
     }
 
-    /// Returns the time at which the picture of a piece was taken. It is the time of the decoded picture, or follows from the distance to
-    /// the last decoded picture.
+    /// Returns the time at which the picture of a piece was taken. It is the time of the decoded picture, if it was decoded. Otherwise, it
+    /// is extrapolated from the last decoded picture.
     fn taken_at(&self, nanos: i64) -> u64 {
         let is_it = |decoded: &&(i64, u64)| decoded.0.abs_diff(nanos) <= SAME_NANOS;
         if let Some(&(_, at)) = self.decoded.iter().find(is_it) {

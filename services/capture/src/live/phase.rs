@@ -1,8 +1,8 @@
-//! Measures how far the pictures of a camera are from the common instants, and whether that changes.
+//! Measures the skew of a camera (the difference between the times of its pictures and the common instants), and its change over time.
 
 use std::collections::VecDeque;
 
-/// Number of pictures whose median is one measurement.
+/// Number of pictures whose median skew is one measurement.
 const N_PICTURES: usize = 15;
 /// Time for which measurements are used, in nanoseconds.
 const WINDOW_NANOS: u64 = 60_000_000_000;

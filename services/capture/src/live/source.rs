@@ -14,11 +14,12 @@ use super::address::{LiveCamera, LiveError};
 use super::input::{Input, Taken};
 use super::originals::Originals;
 
-/// Maximum number of waiting pictures. The oldest is replaced by a new one, so pictures are never late by more than this number.
+/// Maximum number of waiting pictures. A new picture replaces the oldest one, so the picture in use is never more than this many pictures
+/// old.
 const N_WAITING: usize = 4;
 /// Minimum number of pictures before a rate is reported.
 const LEAST_FOR_RATE: u64 = 30;
-/// Time without a picture after which a decoder is ended, if it has no limit of its own or does not keep to it.
+/// Time without a picture after which a decoder is stopped, if it has no time limit of its own or exceeds it.
 const LONGEST_SILENCE: Duration = Duration::from_secs(15);
 /// First pause before a camera is opened again.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
@@ -83,7 +84,7 @@ impl Shared {
     }
 }
 
-/// A camera that a separate thread opens, and opens again after failures, until this is dropped.
+/// A camera that a separate thread opens, and reopens after failures, until this value is dropped.
 #[derive(Debug)]
 pub(crate) struct Source {
     shared: Arc<Shared>,
@@ -192,7 +193,7 @@ impl Keeper {
             };
             let Some(error) = failed else { return };
             let status = error.status();
-            // Only a test shows whether the camera sends a boundary before its first picture.
+            // Whether the camera sends a boundary before its first picture can only be found out by trying.
             let is_tried = self.camera.is_http() && n_read == 0;
             is_bare ^= is_tried;
             if is_tried && is_bare && said.is_none() {

@@ -1,4 +1,4 @@
-//! Reconstructs a recorded stream from a given picture on.
+//! Reconstructs a recorded stream, starting at a given picture.
 
 use std::io;
 use std::path::Path;

@@ -94,7 +94,7 @@ fn every_instant_has_the_nearest_picture_and_the_others_are_left_out() {
         (0, 2, 10),
         (1, 98, 11),
         (2, 205, 12),
-        // There is no picture at 300, and there are two at 400.
+        // There is no picture near 300 ms, and there are two near 400 ms.
         (3, 399, 13),
         (4, 430, 14),
         (5, 501, 15),

@@ -206,7 +206,7 @@ fn line_at(file: &Mutex<File>, place: u64, n: usize) -> Result<String, Failure> 
     Ok(text)
 }
 
-/// Returns the cameras and joints from the settings of a run, if they can be read.
+/// Returns the cameras and joints, read from the settings of a run, if these can be read.
 fn scene(folder: &Path, notes: &mut Vec<String>) -> Scene {
     let file = folder.join("deployment.json");
     let text = failure::read_text(&file);

@@ -57,7 +57,7 @@ impl Events {
         self.has_refused = true;
     }
 
-    /// Processes a result, and reports when skeletons are missing and when they are back.
+    /// Processes a result. Reports when skeletons start to be missing, and when they are found again.
     pub(crate) fn result(&mut self, board: &Board, moment: &Moment) {
         let Some(why) = &moment.why else {
             if self.n_without >= IN_A_ROW {
@@ -78,7 +78,7 @@ impl Events {
         }
     }
 
-    /// Processes a frame of a view, and reports when its camera fails and when it is back.
+    /// Processes a frame of a view. Reports when its camera fails, and when it works again.
     pub(crate) fn frame(&mut self, board: &Board, scene: &Scene, view: usize, status: Status) {
         let Some(last) = self.frames.get_mut(view).filter(|frame| **frame != status) else {
             return;
@@ -92,7 +92,8 @@ impl Events {
         }
     }
 
-    /// Compares the state of all processes with the last check. Reports processes that have died, are back or are silent, and losses.
+    /// Compares the state of all processes with the last check. Reports lost messages, and processes that have died, were restarted or are
+    /// silent.
     pub(crate) fn processes(&mut self, board: &Board, snapshot: &Snapshot) {
         for process in &snapshot.processes {
             let name = &process.name;

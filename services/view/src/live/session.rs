@@ -23,7 +23,7 @@ const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest pause between two checks of the cameras while there is no result.
 const PATIENCE: Duration = Duration::from_millis(90);
 
-/// Decision whether to continue following the deployment.
+/// Whether the deployment is still running.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Look {
     /// The deployment still runs.
@@ -44,7 +44,7 @@ pub(crate) struct Session {
     tape: Option<Tape>,
     /// Time at which the state of the processes was last read.
     told: Option<Instant>,
-    /// Time at which the cameras were last read.
+    /// Time at which the pictures of the cameras were last read.
     looked: Option<Instant>,
     /// Session number of the run; `None` until a process has reported it.
     run: Option<u64>,
@@ -120,8 +120,8 @@ impl Session {
         })
     }
 
-    /// Puts new messages on the board. The cameras are read right after a result. Reducing pictures takes processor time, and the
-    /// deployment is most likely to have some to spare at this moment.
+    /// Puts new messages on the board. The pictures of the cameras are read right after a result, because scaling them down takes processor
+    /// time, and the deployment is most likely to be idle at this moment.
     ///
     /// # Errors
     ///
