@@ -1,4 +1,4 @@
-//! The device that searches frames: the choice for a run, and the GPU of a process.
+//! The device (processor or GPU) that searches frames: its choice for a run, and the GPU of a process.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,7 +10,7 @@ use pipeline::ViewStep;
 /// The GPU of this process; `None` until the first view requests it.
 static OPENED: Mutex<Option<Arc<gpu::Device>>> = Mutex::new(None);
 
-/// Returns a line about the device of a run and the reason for the choice. Returns `None` if there is no choice.
+/// Returns a line with the device of a run and the reason for its choice. Returns `None` if there is only one possible device.
 ///
 /// # Errors
 ///

@@ -29,8 +29,7 @@ const EXPORT: &str = "export";
 const MANIFEST: &str = ".export.json";
 
 /// Refuses a deployment if another deployment with the same name is running. This check comes before checks that take a long time.
-///
-/// Deployments of several hosts get a name per host later. They are refused when their processes start.
+/// Deployments of several hosts get a name per host later, and are refused when their processes start.
 ///
 /// # Errors
 ///
@@ -42,9 +41,9 @@ pub fn check_name(deployment: &Deployment) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a folder with results of an earlier run, or with files of the same names that were not written by a run.
+/// Refuses an output folder that contains results of an earlier run, or other files with the names of results.
 ///
-/// * `force`: true to allow that the results of an earlier run are replaced. Files that were exported from them are removed. The results
+/// * `force`: true to replace the results of an earlier run. Files that were exported from these results are removed. The results
 ///   themselves are kept until the new results are complete.
 ///
 /// # Errors
@@ -105,7 +104,7 @@ fn remove_exports(folder: &Path) -> io::Result<()> {
         let listed = value.get("files").and_then(Value::as_array);
         for file in listed.into_iter().flatten() {
             let path = file.get("path").and_then(Value::as_str).map(Path::new);
-            // Only files in the folder are removed, even if the list has paths elsewhere.
+            // Only files in the folder are removed, even if the list names files in other folders.
             let Some(name) = path.and_then(Path::file_name) else {
                 continue;
             };

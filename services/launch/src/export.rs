@@ -1,6 +1,6 @@
-//! Export of a finished run to the files of other tools: reads the run, writes the files, and describes them.
+//! Exports a finished run to the file formats of other tools: reads the run, writes the files, and describes them.
 //!
-//! The crate `exports` defines the content of each format. This module handles the files, the cameras and their pictures.
+//! The crate `exports` writes the content of each format. This module handles files, cameras and pictures.
 
 mod origin;
 mod per_view;
@@ -81,9 +81,9 @@ pub struct Written {
     pub format: &'static str,
     /// The file, or the folder of the format.
     pub path: PathBuf,
-    /// Unit of the file, its axes, its representation of a gap, and its representation of uncertainty.
+    /// Descriptions of the file: its unit, its axes, and how it represents gaps and uncertainty.
     pub about: [&'static str; 4],
-    /// Facts that the format cannot express.
+    /// Properties of the run that the format cannot express.
     pub notes: Notes,
 }
 
@@ -293,7 +293,7 @@ pub(crate) fn interrupted() -> Failure {
     Failure::new(ExitKind::Interrupted, "interrupted")
 }
 
-/// Returns a camera as its footage shows it.
+/// Returns a camera, with intrinsics for the pictures of its footage.
 pub(crate) fn of_footage(view: &str, framing: &geometry::Framing, size: [u32; 2]) -> ViewCamera {
     ViewCamera {
         name: view.to_owned(),

@@ -1,5 +1,5 @@
-//! Joints of people in every camera of a deployment, as films whose clocks can be compared. The joints are read from keypoint files, or
-//! found by a network in the footage.
+//! Films (the joints of people over time, one film per camera), by which the clocks of a deployment's cameras can be compared. The joints
+//! are read from keypoint files, or found by a network in the footage.
 
 mod eyes;
 mod upright;
@@ -31,10 +31,10 @@ pub struct Part {
     pub seconds: Option<f64>,
 }
 
-/// Knowledge about the poses of the cameras.
+/// Whether the poses of the cameras are known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Poses {
-    /// The poses of the rig are right. As in a run, pictures are turned upright before people are searched in them.
+    /// The poses in the rig are right. Pictures are turned upright before people are searched in them, as in a run.
     OfRig,
     /// Poses are unknown.
     Unknown,
@@ -49,11 +49,12 @@ pub struct Films {
     pub films: Vec<Film>,
     /// Number of joints of a person.
     pub n_joints: usize,
-    /// For each joint, the joint on the other side of the body. Set if some camera names left and right as seen in the picture.
+    /// For each joint, the joint on the other side of the body. Set if, for at least one camera, left and right are named as seen in the
+    /// picture.
     pub mirror: Option<Vec<usize>>,
     /// For each joint, the joint on the other side of the body.
     pub sides: Vec<usize>,
-    /// Source of the joints of each camera, for the user.
+    /// For each camera, a description of the source of its joints, for the user.
     pub finders: Vec<String>,
 }
 

@@ -1,13 +1,13 @@
-//! Intervals at which boxes around people are searched.
+//! Intervals at which the detector searches for people.
 
 use deployment::network::Config;
 
-/// Largest time between two frames in which a box can follow a person, in seconds. If frames are further apart, boxes are searched in
+/// Largest time between two frames over which a box can follow a person, in seconds. If frames are further apart, the detector searches
 /// every frame.
 pub const FOLLOWED_S: f64 = 0.4;
 
-/// Intervals in frames: boxes are searched in every n-th frame of a view. The deployment sets the interval; otherwise it depends on the
-/// rate.
+/// Intervals in frames: the detector searches every n-th frame of a view for people. If the deployment does not set the interval, it
+/// depends on the frame rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FindEvery {
     /// Interval while one person is seen.
@@ -20,9 +20,10 @@ impl FindEvery {
     /// Chooses the intervals.
     ///
     /// * `rate_hz`: rate of the frames that are searched. It is not known for pictures in a folder, which may have been taken at any time.
-    ///   Nobody is followed in such pictures.
+    ///   In such pictures, people are not followed from frame to frame.
     pub(crate) fn new(config: &Config, rate_hz: Option<f64>) -> Self {
-        /// Interval while one person is seen, in seconds. How fast people come and go depends on time, not on frames.
+        /// Interval while one person is seen, in seconds. It is a time rather than a number of frames, because people come and go at the
+        /// same speed at any frame rate.
         const SECONDS: f64 = 0.5;
         /// Interval while several people are seen, in seconds.
         const SECONDS_OF_SEVERAL: f64 = 0.125;

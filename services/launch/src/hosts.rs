@@ -14,7 +14,7 @@ use messages::topic;
 use crate::prepare::{Prepared, View};
 use crate::resolved::Resolved;
 
-/// Largest uncertainty of another host's clock without a warning, as a share of the time between two frames.
+/// Uncertainty of another host's clock above which a warning is logged, as a fraction of the time between two frames.
 const MAX_CLOCK_SHARE: f64 = 0.1;
 
 /// Returns the host that runs on this machine: the host named by the user, or the host with the name of the machine. Returns `None` for a
@@ -168,7 +168,7 @@ pub fn part(deployment: &Deployment, host: &Host) -> Deployment {
     part
 }
 
-/// Returns the name under which the processes of a host share memory.
+/// Returns the namespace of the shared memory of a host's processes.
 pub(crate) fn namespace(resolved: &Resolved) -> String {
     let deployment = &resolved.deployment;
     match resolved.own_host().filter(|own_host| !own_host.fuses) {

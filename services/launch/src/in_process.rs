@@ -1,5 +1,5 @@
-//! The pipeline of a deployment in one process, for people found by networks. It has the same steps as the separate processes, and
-//! gives the same bits.
+//! The pipeline of a deployment in one process, for people found by networks. It executes the same steps as the separate processes, and
+//! gives results that are equal bit for bit.
 
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
@@ -37,7 +37,7 @@ impl InProcess {
     ///
     /// # Errors
     ///
-    /// Fails if an input cannot be read, or the filters find people in the deployment.
+    /// Fails if an input cannot be read, or if the deployment uses filters to find people.
     pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let prepared = Prepared::new(resolved)?;

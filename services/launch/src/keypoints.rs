@@ -1,4 +1,4 @@
-//! Keypoints that another program found in the footage of cameras, and grey footage for cameras that have only keypoints.
+//! Keypoints that another program found in the footage of cameras, and grey frames for cameras that have only keypoints.
 
 use capture::Blank;
 use deployment::Deployment;
@@ -37,7 +37,7 @@ pub fn of_camera(camera: &Camera) -> Result<Option<KeypointSource>, Failure> {
 /// Properties of the keypoints that the networks and keypoint files of the cameras find.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
-    /// Names of the keypoints other than the joints, each once, in the order of the cameras.
+    /// Names of all keypoints that are not joints, without repetitions, in the order of the cameras.
     pub(crate) extra: Vec<String>,
     /// True if a network names left and right as seen in the picture.
     pub(crate) as_seen: bool,
@@ -95,8 +95,8 @@ pub(crate) fn lengths(deployment: &Deployment) -> Result<Vec<Option<u64>>, Failu
         .collect()
 }
 
-/// Returns the deployment with grey footage for every camera without a source. The footage has the image size of the rig, and is as long as
-/// the keypoints.
+/// Returns the deployment with generated grey frames as the source of every camera that has none. The frames have the image size in the
+/// rig, and there are as many as the keypoints need.
 ///
 /// # Errors
 ///

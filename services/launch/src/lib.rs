@@ -9,11 +9,11 @@
 //! | plan processes and topics, and run them | [`Planned`] |
 //! | run one of its processes | [`process`] |
 //! | show progress, and report on the run | [`Watcher`], [`Report`] |
-//! | get the joints that the cameras see, to compare their clocks | [`films`] |
-//! | select the part of one of several hosts | [`hosts`] |
+//! | get the joints that every camera sees, to compare the clocks of the cameras | [`films`] |
+//! | select the part of a deployment that one host runs | [`hosts`] |
 //! | observe a running deployment from another process | [`live`] |
-//! | read the settings in a recording, and report its flaws | [`recorded`] |
-//! | export a finished run to the files of other tools | [`export`] |
+//! | read the settings from a recording, and report damaged or missing parts | [`recorded`] |
+//! | export a finished run to the file formats of other tools | [`export`] |
 //!
 //! Data goes to standard output and messages to standard error, both through [`terminal::output`].
 #![forbid(unsafe_code)]

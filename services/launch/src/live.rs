@@ -18,7 +18,7 @@ pub use table::table;
 use crate::load;
 use crate::resolved::Resolved;
 
-/// Time that a deployment may take to start. Its topics are complete when it publishes its description.
+/// Time that a deployment may take to start. When it publishes its description, all its topics exist.
 const STARTING: Duration = Duration::from_secs(10);
 /// Time to wait for the first metrics of all processes.
 const PATIENCE: Duration = Duration::from_secs(2);

@@ -8,7 +8,7 @@ use deployment::{ConfigError, Deployment, Loaded, Machine};
 use failure::{ExitKind, Fault};
 use scene::Address;
 
-/// Reason why a deployment could not be loaded.
+/// Error if a deployment cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file could not be read.
@@ -16,7 +16,7 @@ pub enum LoadError {
     Read {
         /// Path of the file.
         file: PathBuf,
-        /// Explanation if this is not a deployment file; empty if the system's error is sufficient.
+        /// Explanation why this cannot be a deployment file; empty if the system's error is sufficient.
         why: &'static str,
         /// Error of the system.
         source: std::io::Error,
@@ -53,7 +53,7 @@ pub fn read(file: &Path, set: &[String]) -> Result<Loaded, LoadError> {
     Ok(Loaded::parse(&text, file, set, &ThisMachine)?)
 }
 
-/// Returns a loaded deployment with some values replaced; see [`Loaded::again`].
+/// Returns a loaded deployment in which some values are replaced; see [`Loaded::again`].
 ///
 /// * `set`: `key=value` pairs that replace values.
 /// * `refused`: returns the reason why a key may not be replaced, or `None` if it may.

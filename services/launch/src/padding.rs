@@ -1,9 +1,9 @@
-//! Warns of frames that are largely padding, because their aspect ratio differs from that of the camera's image.
+//! Warns if a large part of the frames is padding, because their aspect ratio differs from that of the camera's image.
 
-/// Minimum share of padding that is reported.
+/// Minimum fraction of padding in a frame that is reported.
 const MIN_SHARE: f64 = 0.1;
 
-/// Returns a warning about the cameras whose frames are largely padding, if there are any.
+/// Returns a warning that names the cameras in whose frames a large part is padding, if there are any.
 ///
 /// * `frame`: width and height of the frames, in pixels.
 /// * `cameras`: name, and width and height of the image in pixels, of every camera.
@@ -36,7 +36,7 @@ fn scale(image: [u32; 2], frame: [usize; 2]) -> f64 {
     of_axis(0).min(of_axis(1))
 }
 
-/// Returns the share of a frame that remains empty when an image is scaled to fit into it.
+/// Returns the fraction of a frame that remains empty when an image is scaled to fit into it.
 fn share(image: [u32; 2], frame: [usize; 2]) -> f64 {
     let scale = scale(image, frame);
     let area = f64::from(image[0]) * f64::from(image[1]) * scale * scale;

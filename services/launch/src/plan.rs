@@ -25,23 +25,23 @@ use crate::scheduling;
 use crate::search_size::SearchSize;
 use crate::vertical;
 
-/// Limit on the processor time of an iteration, relative to the longest iteration so far. It applies to main loops with comparable
-/// iterations (a frame, or a level of a pair).
+/// Limit on the processor time of an iteration, as a multiple of the longest iteration so far. It applies to main loops whose iterations
+/// take similar time (a frame, or a pyramid level of a pair of views).
 const MAX_WORK_FACTOR: u32 = 3;
 /// Length of the window in which restarts of a process are counted.
 const RESTART_WINDOW: Duration = Duration::from_mins(1);
 
-/// Resolves a deployment. Adds grey footage to cameras that have only keypoints, reads the metadata of the footage, and checks footage and
-/// calibration against each other. Finds the vertical if it is not given, and logs warnings.
+/// Resolves a deployment. Adds generated grey frames to cameras that have only keypoints, reads the metadata of the footage, and checks
+/// footage and calibration against each other. Finds the vertical if it is not given, and logs warnings.
 ///
 /// # Errors
 ///
-/// Fails if footage or calibration cannot be read, or no joints can be located in space with them.
+/// Fails if the footage or the calibration cannot be read, or if joints cannot be located in 3D with them.
 pub fn resolve(deployment: &Deployment) -> Result<Resolved, Failure> {
     resolve_on(deployment, None)
 }
 
-/// Resolves the part of a deployment that one of its hosts runs. Nothing is read for the cameras of other hosts.
+/// Resolves the part of a deployment that one of its hosts runs. The footage of other hosts' cameras is not read.
 ///
 /// # Errors
 ///
@@ -163,7 +163,7 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     let topology = resolved.topology();
     let mut rooms = topology.rooms(mode, &sizes, held_frames);
     if resolved.is_far() {
-        // On a host with cameras, topics of other views and of fusion are on other hosts.
+        // A host with cameras has no topics of fusion or of other views; these are on other hosts.
         let uses = |process: &Process, topic: &String| {
             process.inputs.contains(topic) || process.outputs.contains(topic)
         };
@@ -174,8 +174,8 @@ pub(crate) fn topics(resolved: &Resolved, prepared: &Prepared, names: &[String])
     between.chain(of_processes).collect()
 }
 
-/// Returns the maximum size of a live camera's original picture, in bytes, if it is recorded. No format is larger than RGB, but a small
-/// picture may also contain tables.
+/// Returns the maximum size of a live camera's original picture, in bytes, if it is recorded. Pictures in other formats are not larger than
+/// RGB pixels, except small pictures whose format contains tables.
 fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
     const TABLES: usize = 1 << 16;
     let recording = resolved.recording.as_ref();
@@ -190,7 +190,7 @@ fn picture_bytes(resolved: &Resolved, view: usize) -> usize {
 /// Returns the plan of a topic with the given limits and message sizes.
 fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(room.receivers, room.queued, room.borrowed);
-    // If a topic allows onlookers, these include programs of the user.
+    // A topic that allows onlookers (observing programs) must have room for the user's own programs.
     let guests = if room.onlookers > 0 { MOST_GUESTS } else { 0 };
     let limits = limits.with_onlookers(room.onlookers + guests);
     let (topic, longest) = (room.topic, room.longest);
@@ -258,8 +258,8 @@ fn process(
             process.service,
             &process.name,
         ),
-        // There is no limit for stages that write files, whose work varies. There is also none with lossless delivery, which has no
-        // deadlines.
+        // Stages that write files have no limit, because their work varies. With lossless delivery, no stage has a limit, because there are
+        // no deadlines.
         most_work: (is_realtime && is_comparable).then_some(MAX_WORK_FACTOR),
     }
 }

@@ -81,7 +81,7 @@ impl Planned {
         self.plan.processes.iter().map(|process| process.name.as_str())
     }
 
-    /// Returns the same run with the start time that another host has set.
+    /// Returns the same run, but with the start time that another host has set.
     ///
     /// * `session`: start of the run according to the fusing host; `None` if the run starts here.
     #[must_use]

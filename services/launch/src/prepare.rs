@@ -27,7 +27,7 @@ pub struct View {
     pub name: String,
     /// Mapping from the camera's footage to the frames of the pipeline.
     pub framing: Framing,
-    /// Camera, pyramid layout and cells of the frames.
+    /// Camera of the frames, and layout and cells of their pyramid.
     pub plan: Arc<ViewPlan>,
 }
 
@@ -38,14 +38,14 @@ pub struct Prepared {
     pub model: Arc<Model>,
     /// The views, in the order of their numbers.
     pub views: Vec<View>,
-    /// The pairs of views that are fused, in ascending order. If all views are solved at once, each view after the first is paired with
-    /// the view before it. Then every view is in a pair, and there is one pair per message.
+    /// The pairs of views that are fused, in ascending order. If all views are solved at once, each view after the first is paired with the
+    /// view before it, so that every view is in a pair, and each pair has one message.
     pub pairs: Vec<[usize; 2]>,
     /// Upward direction, if the rig gives it.
     pub up_in_world: Option<UnitVector3<f64>>,
     /// The settings of all stages.
     pub settings: EstimatorSettings,
-    /// Warning about padding, if the frames are largely padding.
+    /// Warning, if a large part of the frames is padding.
     pub padding: Option<String>,
 }
 
@@ -115,8 +115,8 @@ impl Prepared {
         Ok(Some(predictor))
     }
 
-    /// Checks that the networks can be loaded, and that the table of expected errors contains every view. Warns of views without a row for
-    /// any frame.
+    /// Checks that the networks can be loaded, and that the table of expected errors contains every view. Warns of views for which the
+    /// table has no rows.
     ///
     /// # Errors
     ///
@@ -256,7 +256,7 @@ fn skeleton_settings(
     let config = &deployment.paper;
     let joints = JointSet::by_name(&deployment.person.joints).unwrap_or(defaults.joints);
     let joint_map = if deployment.has_maps() {
-        // No mapping is needed, because the parts are the joints.
+        // No mapping is needed, because the parts of the model are the joints.
         None
     } else {
         inputs::Joints::of(&config.joint_map, config.model.as_deref())?.map(learned, joints)
@@ -286,7 +286,7 @@ pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSetti
     }
 }
 
-/// Returns the settings of the step in space.
+/// Returns the settings of the step that computes 3D joints.
 pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
     let skeleton = &prepared.settings.skeleton;
     let least_heat = resolved.deployment.network.least_heat;
@@ -303,7 +303,7 @@ pub(crate) fn frame_scale(framing: &Framing) -> f64 {
     1.0 / (a * d - b * c).abs().sqrt()
 }
 
-/// Returns the heat, from 0 to 1, that at least half of the joints have if a view sees the person well.
+/// Returns the heat, from 0 to 1, that at least half of the joints must have for the view to count as seeing the person well.
 pub(crate) fn least_heat(deployment: &Deployment) -> f64 {
     2.0 * deployment.network.least_heat
 }

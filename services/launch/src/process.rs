@@ -114,7 +114,7 @@ pub struct ProcessArguments {
 ///
 /// # Errors
 ///
-/// Fails if the resolved deployment cannot be read or used, it has no such process, or the service fails.
+/// Fails if the resolved deployment cannot be read or used, if it has no such process, or if the service fails.
 pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Result<(), Failure> {
     let resolved = Resolved::read(&arguments.plan)?;
     let n_views = resolved.deployment.cameras.len();
@@ -149,8 +149,8 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
     }
 }
 
-/// Returns a builder for the thread pool of a process. If the pool has several threads, the calling thread is one of them. Work that is
-/// started outside the pool would not use its threads.
+/// Returns a builder for the thread pool of a process. If the pool has several threads, the calling thread is one of them. Otherwise, work
+/// that is started outside the pool would not use its threads.
 fn pool(n_threads: usize) -> ThreadPoolBuilder {
     let pool = ThreadPoolBuilder::new().num_threads(n_threads);
     if n_threads > 1 {
@@ -209,8 +209,8 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     pose::run(service, &job)
 }
 
-/// Returns the largest number of frames between two frames in which the same person can be followed. With any `frame_step`, it
-/// is large enough that nobody is lost from one frame to the next.
+/// Returns the largest number of frames between two frames in which the same person can be followed. It is at least `frame_step`, so that
+/// people are always followed from one used frame to the next.
 pub(crate) fn most_apart(resolved: &Resolved) -> Option<f64> {
     let step = resolved.deployment.capture.frame_step as f64;
     let rate_hz = resolved.frame_rate_hz()?;

@@ -17,7 +17,7 @@ use crate::prepare::Prepared;
 use crate::resolved::Resolved;
 use inputs::Shipped;
 
-/// Maximum number of damaged messages, and of damaged places, that are listed as text.
+/// Maximum number of damaged messages, and maximum number of damaged sections, that are listed as text.
 const MAX_LISTED: usize = 10;
 
 /// The settings of a run that its recording contains.
@@ -25,7 +25,7 @@ const MAX_LISTED: usize = 10;
 pub struct Settings {
     /// The resolved deployment, which every process gets as input.
     pub resolved: Resolved,
-    /// Fingerprints (FNV-1a) of the input files, by path. Shipped files are listed by their name.
+    /// Fingerprints (FNV-1a hashes) of the input files, by path. Files that are included in Parallax are listed by name.
     pub files: BTreeMap<PathBuf, u64>,
 }
 
@@ -93,7 +93,7 @@ pub(crate) fn fingerprints(deployment: &Deployment) -> Result<BTreeMap<PathBuf, 
     let named = named.filter(|(_, file)| !deployment::is_none(file));
     let networks = deployment.pose_networks().into_iter();
     for (kind, file) in named.chain(networks.map(|file| (Shipped::PoseNetwork, file))) {
-        // The deployment calls every shipped file "shipped".
+        // In the deployment, the path of every file that is included in Parallax is "shipped".
         let name = if deployment::is_shipped(file) {
             kind.name()
         } else {
@@ -131,12 +131,12 @@ pub fn settings(file: &Path, recording: &Recording) -> Result<Settings, Failure>
     })
 }
 
-/// Returns true if the file is undamaged and contains every message that was sent, as far as the file shows.
+/// Returns true if, as far as the file itself shows, it is undamaged and contains every message that was sent.
 pub fn is_whole(recording: &Recording) -> bool {
     is_undamaged(recording) && recording.n_lost() == 0
 }
 
-/// Returns true if the file is complete and undamaged, as far as a scan shows. The content of the messages is not checked.
+/// Returns true if a scan has found the file to be complete and undamaged. The content of the messages is not checked.
 pub fn is_undamaged(recording: &Recording) -> bool {
     let extent = &recording.extent;
     extent.is_complete
@@ -211,7 +211,7 @@ pub fn damaged_json(damaged: &[Damaged]) -> Value {
     damaged.collect()
 }
 
-/// Describes a recording as text: one line about its content, and one line per flaw.
+/// Describes a recording as text: one line about its content, and one line for each damaged or missing part.
 pub fn text(file: &Path, recording: &Recording) -> String {
     let extent = &recording.extent;
     let mut text = format!(

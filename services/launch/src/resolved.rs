@@ -36,7 +36,7 @@ pub struct Resolved {
     pub replay: Option<Replay>,
 }
 
-/// Key for the answers of `ffprobe`, which are stored beside the keys of [`Resolved`].
+/// Key of the output of `ffprobe`, which is stored beside the fields of [`Resolved`].
 const ANSWERS: &str = "ffprobe";
 
 /// The services, in pipeline order.
@@ -106,7 +106,7 @@ impl Resolved {
         .map_err(|error| failure::in_file(file, &error))
     }
 
-    /// Returns the text that every process gets on standard input. It includes the known properties of the footage, which need not be
+    /// Returns the text that every process gets on standard input. It includes the properties of the footage, so that they need not be
     /// determined again.
     pub(crate) fn to_text(&self) -> Result<String, Failure> {
         let mut value = serde_json::to_value(self).or_fail(ExitKind::Run)?;
@@ -167,7 +167,7 @@ impl Resolved {
         self.deployment.host(self.host.as_deref()?)
     }
 
-    /// Returns true if this is a host with cameras, and another host has the results.
+    /// Returns true if this host only has cameras, and another host computes the results.
     pub fn is_far(&self) -> bool {
         self.own_host().is_some_and(|own_host| !own_host.fuses)
     }

@@ -16,14 +16,14 @@ use crate::resolved::Resolved;
 
 /// The largest ratio of two frame rates at which frames can be paired by number.
 const MAX_RATE_RATIO: f64 = 1.02;
-/// Minimum range of brightness over the cells of an image, out of 255. Images with less contrast are not compared.
+/// Minimum range of brightness over the cells of an image, on a scale from 0 to 255. Images with less contrast are not compared.
 const MIN_CONTRAST: f64 = 16.0;
-/// Warning about footage without a frame rate.
+/// Warning about footage whose frame rate is unknown.
 const NO_RATE: &str = "the frame rate of the footage is not known: times, speeds and pose3d.trc are left out; \
     set `capture.frame_rate_hz`";
-/// If the brightest value of a picture is below this value (out of 255), the picture uses only a small part of the range.
+/// A picture whose brightest value is below this value (from 0 to 255) uses only a small part of the range.
 const LEAST_BRIGHTEST: u8 = 64;
-/// Two images look the same if their mean difference of brightness over the cells is below this value (out of 255).
+/// Two images count as similar if the mean brightness difference of their cells is below this value (from 0 to 255).
 const MIN_DIFFERENCE: f64 = 1.0;
 /// Number of cells of the brightness grid, in each direction.
 const CELLS: usize = 32;
@@ -32,8 +32,8 @@ const CELLS: usize = 32;
 ///
 /// # Errors
 ///
-/// Fails if no joints can be located in space: there is a single camera, cameras are in one place, the unit is wrong, two cameras have
-/// the same source, or frame rates differ.
+/// Fails if joints cannot be located in 3D, because there is only one camera, cameras are at the same place, the unit of the calibration is
+/// wrong, two cameras have the same source, or frame rates differ.
 fn check(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let mut warnings = deployment.doubts(n_cores());
@@ -103,7 +103,7 @@ fn check_cameras(deployment: &Deployment) -> Result<Vec<String>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     let named = deployment.cameras.iter().filter_map(|camera| rig.camera(&camera.name));
     let used = Rig::new(named.cloned().collect(), rig.up_in_world(), rig.source());
-    // If the rig lacks a camera, this is reported elsewhere, with its name.
+    // A camera that is missing from the rig is reported by another check, with its name.
     let Ok(used) = used else {
         return Ok(Vec::new());
     };
@@ -193,8 +193,8 @@ fn without_rate(resolved: &Resolved) -> Option<String> {
     })
 }
 
-/// Warns of live cameras with different rates. Their pictures are paired by time, so a slower camera merely lacks a picture at some
-/// instants.
+/// Warns of live cameras with different rates. Their pictures are paired by time, so different rates only mean that a slower camera has no
+/// picture for some frames.
 fn of_live_rates(resolved: &Resolved, rates: &str, ratio: f64) -> Result<Option<String>, Failure> {
     if ratio <= MAX_RATE_RATIO || resolved.deployment.capture.frame_rate_hz.is_some() {
         return Ok(None);
@@ -242,7 +242,7 @@ fn shorter(all: &[(&str, u64)]) -> Option<String> {
     })
 }
 
-/// Refuses cameras whose first images are identical. Warns of cameras whose first images look the same.
+/// Refuses cameras whose first images are identical. Warns of cameras whose first images are almost identical.
 fn check_images(resolved: &Resolved) -> Result<Vec<String>, Failure> {
     let deployment = &resolved.deployment;
     let first = deployment

@@ -1,4 +1,4 @@
-//! The scheduling that processes of a deployment request, without requests that the system denies.
+//! The scheduling that processes of a deployment request. Requests that the system would deny are removed.
 
 use deployment::Runtime;
 use runtime::{Denied, RealTime, Scheduling};

@@ -1,4 +1,4 @@
-//! The size of frames if the deployment sets none: chooses it from the calibration, and describes the choice.
+//! Chooses the size of the frames from the calibration if the deployment sets no size, and describes the choice.
 
 use core::fmt::Write as _;
 
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct SearchSize {
     /// The size of every camera's frames, in the order of the deployment.
     pub cameras: Vec<CameraSize>,
-    /// Largest number of cameras that share a space in which a person can stand; 0 if no two cameras share one.
+    /// Largest number of cameras that can see a person at the same place; 0 if no two cameras can.
     pub n_sharing: usize,
 }
 
@@ -23,15 +23,15 @@ pub struct SearchSize {
 pub struct CameraSize {
     /// Name of the camera.
     pub name: String,
-    /// Scale of the frames, as a share of the camera's image.
+    /// Scale of the frames, as a fraction of the camera's image size.
     pub scale: f64,
     /// Width and height of the frames, in pixels.
     pub frame_size: [u32; 2],
-    /// Height of a person in the camera's image, in pixels. The person is in the space that the camera shares with other cameras.
+    /// Height in the camera's image, in pixels, of a person in the space that the camera shares with other cameras.
     pub person_px: Option<f64>,
     /// Height of the same person in the frames, in pixels.
     pub person_in_frame_px: Option<f64>,
-    /// True if the person is too small in the frames because the number of pixels is limited.
+    /// True if the person is too small in the frames, because a limit on the number of pixels prevents larger frames.
     pub is_limited: bool,
 }
 

@@ -59,7 +59,7 @@ pub struct Report {
     budget: Option<Budget>,
     /// The sizes of the frames, if the deployment sets none.
     search_size: Option<SearchSize>,
-    /// Views in which people were too small or too large.
+    /// Views in which people were too small or too large for the search.
     outside: Option<Outside>,
     /// The last metrics of every process.
     measured: BTreeMap<String, Value>,
@@ -67,7 +67,7 @@ pub struct Report {
     recorded: Recorded,
     /// Counts of the pictures of live cameras, one line per camera.
     live: String,
-    /// True if another host fuses and has the results.
+    /// True if another host fuses the views and has the results.
     is_far: bool,
 }
 
@@ -188,7 +188,7 @@ impl Report {
     pub fn kind(&self) -> Option<ExitKind> {
         let budget = self.budget.as_ref();
         if budget.is_some_and(Budget::is_exceeded) {
-            // This also applies to an interrupted run, because live cameras always run until they are stopped.
+            // The budget also applies to an interrupted run, because runs with live cameras always end by being interrupted.
             Some(ExitKind::Limit)
         } else if self.interrupted {
             Some(ExitKind::Interrupted)
@@ -213,13 +213,13 @@ impl Report {
                 || self.views.iter().any(|view| view.is_lost(self.is_lossless)))
     }
 
-    /// Returns the reasons, found in the results, not to trust the results.
+    /// Returns the reasons not to trust the results, which were found in the results themselves.
     fn doubts(&self) -> Vec<Doubt> {
         let summary = self.recorded.summary();
         summary.map_or_else(Vec::new, |summary| summary.trust.doubts())
     }
 
-    /// Returns true if frames were lost or the cameras contradict each other.
+    /// Returns true if frames were lost, or if the cameras contradict each other.
     fn is_lossy(&self, summary: &Summary) -> bool {
         let is_incomplete = summary.frames_missed > 0 || summary.frames < self.n_frames;
         trust::are_cameras_doubtful(summary)

@@ -1,5 +1,5 @@
-//! Finds the vertical if neither calibration nor deployment gives it. The vertical is found from people: from heads and ankles in keypoint
-//! files, or from people in rotated pictures.
+//! Finds the vertical if neither the calibration nor the deployment gives it. It is estimated from people: from heads and ankles in
+//! keypoint files, or from the rotation at which people are found best in pictures.
 
 mod kept;
 mod keypoints;
@@ -21,14 +21,14 @@ const STEP: u64 = 20;
 const MAX_VIEWS: usize = 4;
 /// Maximum length of the longer side of a searched image, in pixels.
 const MAX_SIDE_PX: f64 = 480.0;
-/// If two rolls differ by less than this angle, in degrees, only one of them is searched.
+/// If two rotations of an image differ by less than this angle, in degrees, only one of them is searched.
 const SAME_ROLL: f64 = 12.0;
 /// A direction within this angle of a world axis, in degrees, is replaced by the axis.
 const NEAR_AXIS: f64 = 6.0;
 /// If two directions differ by less than this angle, in degrees, only one of them is tried.
 const SAME_DIRECTION: f64 = 10.0;
-/// Scores that differ by less than this count as equal. Among directions with equal scores, the first is used. The direction for level
-/// cameras is tried first.
+/// Scores that differ by less than this count as equal. Of several directions with equal scores, the first is used. The first direction
+/// tried is the one for level cameras.
 const SAME_SCORE: f64 = 0.02;
 
 /// The upward direction that was found, and the reason for the choice.
@@ -40,7 +40,7 @@ pub(crate) struct Vertical {
     pub why: String,
 }
 
-/// A direction that was tried, and the score of the people found with it.
+/// A tried upward direction, and the score of the people found with it.
 #[derive(Debug, Clone, Copy)]
 struct Hypothesis {
     up: UnitVector3<f64>,
@@ -50,12 +50,11 @@ struct Hypothesis {
 
 /// Finds the vertical of a deployment. Returns `None` if the rig or the deployment gives it, or if frames are not turned upright.
 ///
-/// With keypoint files, this is fast. A search of pictures takes a while, so its result is stored beside the rig and used
-/// again.
+/// The search is fast with keypoint files. With pictures it is slow, so its result is stored beside the rig and used again.
 ///
 /// # Errors
 ///
-/// Fails if inputs cannot be read, or nothing shows the upward direction: there are neither keypoints of people nor pictures.
+/// Fails if inputs cannot be read, or there are neither pictures nor keypoints of people that show the upward direction.
 pub(crate) fn find(deployment: &Deployment) -> Result<Option<Vertical>, Failure> {
     let rig = inputs::rig_of(deployment)?;
     if rig.up_in_world().is_some() || !deployment.capture.upright {
@@ -151,8 +150,8 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
     )
 }
 
-/// Returns the directions to try, in this order: up for level cameras, up for cameras rolled by 90 degrees to either side, the world
-/// axes, and the opposite of the first direction.
+/// Returns the directions to try, in this order: the upward direction if the cameras are level, those for cameras rolled by 90 degrees to
+/// either side, the world axes, and the opposite of the first direction.
 fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let axis =
         |camera: &Camera, axis: Vector3<f64>| camera.camera_from_world.rotation.inverse() * axis;
@@ -192,7 +191,7 @@ fn snapped(direction: UnitVector3<f64>) -> UnitVector3<f64> {
 
 /// Returns the direction perpendicular to all given vectors, by least squares with less weight for outliers.
 ///
-/// * `side`: the result points to this side. If the vectors do not determine a plane, the result is `side` itself.
+/// * `side`: the result is less than 90 degrees from this direction. If the vectors do not determine a plane, the result is `side` itself.
 fn common_normal(all: &[Vector3<f64>], side: Vector3<f64>) -> Option<UnitVector3<f64>> {
     let mean = UnitVector3::try_new(side, 1e-6);
     let mut weights = vec![1.0; all.len()];

@@ -27,7 +27,7 @@ pub struct ViewReport {
     pub dropped: u64,
     /// Frames that were lost because a process was dead, or died while processing them.
     pub lost: u64,
-    /// All other frames, which were not reached before the run was stopped.
+    /// All other frames, which were not processed before the run was stopped.
     pub unanswered: u64,
     /// Number of results with a camera fault, by cause. These are included in `empty`.
     pub faults: BTreeMap<String, u64>,
@@ -99,7 +99,7 @@ impl ViewReport {
         }
     }
 
-    /// Returns true if the view is missing from a result for a reason that is not expected with this delivery.
+    /// Returns true if the view is missing from a result for a reason that does not normally occur with this kind of delivery.
     pub fn is_lost(&self, is_lossless: bool) -> bool {
         let is_expected = |reason: &Missing| match reason {
             Missing::Late | Missing::Dropped => !is_lossless,

@@ -81,7 +81,7 @@ pub(crate) fn footage_failure(error: FootageError) -> Failure {
     Failure::new(ExitKind::Input, error)
 }
 
-/// All sights of the board in the footage of one camera.
+/// All sights of the board (pictures in which it was found) in the footage of one camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
     /// Width and height of the camera's pictures.
@@ -90,11 +90,11 @@ pub struct Seen {
     pub n_pictures: usize,
     /// All sights of the board, including sights in inverted and mirrored pictures.
     pub sights: Vec<Sight>,
-    /// Number of pictures in which black and white are exchanged.
+    /// Number of pictures in which black and white are swapped.
     pub n_inverted: usize,
     /// Number of mirrored pictures.
     pub n_mirrored: usize,
-    /// Reasons why the board was not found, each with its number of pictures, most frequent first.
+    /// Reasons why the board was not found, with the number of pictures for each, most frequent first.
     pub nothing: Vec<(Nothing, usize)>,
     /// Source of the picture of each frame: index of the path, and index of the picture in that path.
     pub pictures: BTreeMap<usize, [usize; 2]>,
@@ -105,7 +105,7 @@ pub struct Seen {
 pub struct Looked {
     /// The board that was found in the pictures.
     pub board: Board,
-    /// Difference between this board and the board that the user named, if any.
+    /// Difference between this board and the board that the user named, if they differ.
     pub note: Option<String>,
     /// Corner points of the board, in metres.
     pub layout: Layout,

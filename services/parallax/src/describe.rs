@@ -1,4 +1,4 @@
-//! Describes poses as JSON. Pixels are counted from 0, types and levels from 1.
+//! Describes poses as JSON. Pixels are counted from 0; part types and pyramid levels are counted from 1.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub(crate) struct NamedJoints {
     pub(crate) map: Option<Arc<JointMap>>,
 }
 
-/// A pose with the layout of its pyramid, and the scale from searched to reported pixels.
+/// A pose with the layout of its pyramid, and the scale from pixels of the searched image to reported pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Placed<'a> {
     pose: &'a Pose,
@@ -46,8 +46,8 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// Returns score, level, scale and parts as JSON. With `joints`, also returns the joints of the set: null if the model lacks
-    /// parts that they need.
+    /// Returns score, level, scale and parts as JSON. With `joints`, also returns the joints of the set: null for joints that need parts
+    /// that the model lacks.
     pub(crate) fn json(&self, joints: Option<&NamedJoints>) -> Value {
         let centres: Vec<[f64; 2]> = self
             .pose
@@ -91,7 +91,7 @@ impl<'a> Placed<'a> {
     }
 }
 
-/// Returns the joints of a pose by name: null if the model lacks parts that the set needs.
+/// Returns the joints of a pose by name: null for joints that need parts that the model lacks.
 fn joints_of(centres: &[[f64; 2]], joints: &NamedJoints) -> Value {
     let set = joints.set;
     let needed = set.joints.iter().flat_map(|joint| joint.parts).max().map_or(0, |part| part + 1);

@@ -1,4 +1,4 @@
-//! The file-to-file work behind the commands for rigs and finished runs.
+//! The computations behind the commands that read files and write files, for rigs and finished runs.
 #![forbid(unsafe_code)]
 
 pub mod boards;

@@ -67,7 +67,7 @@ fn directions() -> [[f64; 3]; N] {
     })
 }
 
-/// Returns a network with a map for every colour: 1 at full colour, falling to 0 at three quarters of it.
+/// Returns a network with a map for every colour. The map is 1 at full colour, and falls to 0 at three quarters of it.
 fn network(bias: f32) -> Network {
     let mut net = Network::default();
     let sides = |n: [usize; 4]| n.map(Side::Fixed).to_vec();
@@ -123,7 +123,7 @@ pub(crate) fn joints_at(frame: f64) -> [Point3<f64>; N] {
     STANDING.map(|standing| Point3::from(standing) + by)
 }
 
-/// Maps each joint to the joint whose name a view gives to it; 14 if the view does not see it.
+/// Maps each joint to the joint whose name a view reports for it; 14 if the view does not see the joint.
 pub(crate) type Named = fn(usize) -> usize;
 
 pub(crate) fn as_it_is(joint: usize) -> usize {
@@ -488,7 +488,7 @@ fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
     run(&case, &[]);
     errors.push(errors_mm(&case));
     let (without, told, untold) = (errors[0], errors[1], errors[2]);
-    // For joints and for extra keypoints: the largest error that remains if the skew is known, and the factor by which the error is larger
+    // For joints and for extra keypoints: an upper limit of the error if the skew is known, and the minimum factor by which the error grows
     // if the skew is unknown. Joints and their velocities depend on evidence whose positions are rounded to cells.
     for (which, most, more) in [(0, 2.5, 1.5), (1, 2.5, 2.0)] {
         let [told, untold] = [told, untold].map(|mm| mm[which] - without[which]);

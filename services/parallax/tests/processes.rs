@@ -17,7 +17,7 @@ fn frames(lines: &[Value]) -> Vec<u64> {
 
 #[test]
 fn an_interrupted_run_ends_cleanly() {
-    // The signal is sent only to the parent, as by `kill`, or to all processes at once, as by a terminal.
+    // Like `kill`, sends the signal only to the parent; like a terminal, sends it to all processes at once.
     for (name, sign) in [("int-one", 1), ("int-all", -1)] {
         let case = Case::new(name, &[400; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);

@@ -189,7 +189,7 @@ fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2
     let readings = own::readings(scene, record, view)?;
     let is_exchanged = match fused {
         Some(fused) if !scene.has_maps => fused.exchanged == 1,
-        // Networks may confuse left and right. The 3D solution shows which side is the person's left.
+        // A network may name left and right as seen in the picture. The 3D solution shows which side is the person's left.
         _ => own::is_exchanged(scene, record, view, &readings),
     };
     let [named, exchanged] = readings;

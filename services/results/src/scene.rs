@@ -28,7 +28,7 @@ pub struct Scene {
     pub views: Vec<View>,
     /// True if the candidates of a view are people that a network sees. Fusion then decides which candidate is the followed person.
     pub has_maps: bool,
-    /// Heat, from 0 to 1, that half of a person's joints must reach before the person is used to check the cameras.
+    /// Heat, from 0 to 1, that half of a person's joints must reach for the person to be used in the check of the cameras.
     pub least_heat: f64,
     /// The joints of the result.
     pub joints: &'static JointSet,

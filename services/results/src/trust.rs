@@ -13,9 +13,9 @@ use crate::pose3d::is_placed;
 const LENGTH_STEP_M: f64 = 0.001;
 /// Upper end of the histogram of bone lengths, in metres. Longer bones are counted in the last bin.
 const LONGEST_M: f64 = 1.0;
-/// Movement of the middle of a body between two results from which the result is doubtful, in metres.
+/// Movement of the middle of a body that is always accepted between two results, in metres.
 const FARTHEST_M: f64 = 0.5;
-/// Maximum speed of the middle of a body between two results, in metres per second.
+/// Speed up to which a larger movement between two results is accepted, in metres per second.
 const FASTEST_M_S: f64 = 6.0;
 /// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
 const SD_PER_MAD: f64 = 1.4826;

@@ -1,4 +1,4 @@
-//! Hints for footage that cannot be used.
+//! Hints for the user if footage cannot be used.
 
 use std::io::ErrorKind;
 

@@ -116,8 +116,8 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     looked.collect()
 }
 
-/// Returns the time from the beginning of a run to its first frame in real time, in nanoseconds. By then every process has started, and
-/// streams have delivered their first picture.
+/// Returns the time from the beginning of a run to its first frame in real time, in nanoseconds. It is long enough for every process to
+/// start, and for every stream to deliver its first picture.
 pub(crate) fn lead_nanos(deployment: &Deployment) -> u64 {
     const FOOTAGE: u64 = 2_000_000_000;
     const DEVICES: u64 = 3_000_000_000;
@@ -175,7 +175,7 @@ fn of_live((size, rate_hz): (footage::Size, f64), capture: &Config) -> Footage {
 fn elsewhere(deployment: &Deployment, camera: &Camera) -> Result<Footage, Failure> {
     let capture = &deployment.capture;
     let rig = inputs::rig_of(deployment)?;
-    // If the camera is not in the rig, this is reported later, with its name.
+    // A camera that is not in the rig is reported later, with its name.
     let size = rig.camera(&camera.name).map_or([1; 2], |camera| camera.intrinsics.size);
     let rate_hz = capture.frame_rate_hz;
     Ok(Footage {

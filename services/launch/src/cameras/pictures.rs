@@ -1,4 +1,4 @@
-//! Properties that the files of cameras state about their pictures: the rotation to apply, and the frame numbers.
+//! Properties of pictures that are read from the cameras' files: the rotation to apply, and the frame numbers.
 
 use deployment::Deployment;
 use deployment::capture::{Camera, Rotate, Tag};
@@ -62,7 +62,7 @@ fn turn(deployment: &mut Deployment, files: &[usize]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Returns how the pictures of a file are rotated for a camera of a rig. Logs the result.
+/// Returns the rotation that is applied to the pictures of a file for a camera of a rig. Logs the result.
 pub fn rotation(source: &str, camera: &str, rig: &Rig) -> Rotation {
     let is_turned =
         Tagged::read(source).is_some_and(|tagged| tagged.does_turn(camera, &with_up(rig.clone())));
@@ -91,7 +91,7 @@ impl<'a> Tagged<'a> {
         })
     }
 
-    /// Returns true if a camera was calibrated with the rotated picture. Logs the reason.
+    /// Returns true if a camera was calibrated with rotated pictures. Logs the reason for this decision.
     fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
         let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
         let done = if does_turn {
@@ -121,7 +121,7 @@ fn with_up(rig: Rig) -> Rig {
     level.unwrap_or(rig)
 }
 
-/// Returns true if a calibration is of the rotated picture, and the reason for this decision.
+/// Returns true if a calibration applies to the rotated picture, and the reason for this decision.
 fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, String) {
     const BY_HAND: &str = "to choose explicitly, set `rotate = 0` (as stored) or `rotate = \"tag\"` in the [[camera]]";
     let Some(camera) = rig.camera(name) else {

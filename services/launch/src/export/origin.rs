@@ -16,7 +16,7 @@ use skeleton::JointSet;
 use crate::recorded;
 use crate::resolved::Resolved;
 
-/// Choice of a run's trajectories.
+/// Choice between a run's original and smoothed trajectories.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lines {
     /// The trajectories as the run found them.
@@ -47,7 +47,7 @@ pub struct Given {
     pub lines: Lines,
     /// Frames of the footage per second, if the run has no frame rate.
     pub rate_hz: Option<f64>,
-    /// Upward direction in the world of the rig, in place of the direction that the rig gives.
+    /// Upward direction in world coordinates, which replaces the direction in the rig.
     pub up: Option<UnitVector3<f64>>,
 }
 
@@ -132,7 +132,7 @@ impl Origin {
         })
     }
 
-    /// Returns the cameras as their footage shows them.
+    /// Returns the cameras, with intrinsics for the pictures of their footage.
     ///
     /// # Errors
     ///
@@ -189,7 +189,7 @@ fn of_times(trial: &Trial, n_lines: usize) -> Vec<String> {
     flaws
 }
 
-/// Returns a camera as its footage shows it.
+/// Returns a camera, with intrinsics for the pictures of its footage.
 pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewCamera, Failure> {
     let entry = &resolved.deployment.cameras[nth];
     let refused = |why: String| {
@@ -221,7 +221,7 @@ fn of_folder(folder: &Path) -> Result<Resolved, String> {
     serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))
 }
 
-/// Reads `pose3d.jsonl` line by line. If the run has not ended, reads the lines that exist.
+/// Reads `pose3d.jsonl` line by line. If the run has not ended, reads the lines written so far.
 fn lines(
     folder: &Path,
     which: Lines,

@@ -19,7 +19,7 @@ use crate::resolved::Resolved;
 /// The pictures of a view. Frames must be requested in order.
 #[derive(Debug)]
 pub(super) struct Pictures {
-    /// The camera, as these pictures show it.
+    /// The camera, with intrinsics for these pictures.
     pub(super) view: ViewCamera,
     from: From,
 }

@@ -1,4 +1,4 @@
-//! The network that finds the joints in the pictures of a camera.
+//! The network that finds joints in the pictures of a camera.
 
 use std::path::Path;
 
@@ -54,7 +54,7 @@ impl Eyes {
         format!("network {joints}, boxes by {boxes}")
     }
 
-    /// Starts to follow the people in the pictures of a film, which all have the same size.
+    /// Starts to follow people through the pictures of a film, all of which must have the same size.
     ///
     /// * `rate_hz`: rate of the pictures that are used.
     pub(super) fn watch(self, deployment: &Deployment, size: Size, rate_hz: f64) -> Watch {

@@ -5,7 +5,7 @@ use footage::{Affine, Fill, Size, Warp};
 
 use super::eyes::Found;
 
-/// Smaller rotations, in radians, are not applied, because people are found without them.
+/// Minimum angle of an applied rotation, in radians. With smaller angles, people are found without rotation.
 const LEAST: f64 = 0.1;
 
 /// Rotates the pictures of a camera.

@@ -7,7 +7,7 @@ use runtime::metrics::{Reading, ReadingError};
 
 use crate::resolved::SERVICES;
 
-/// A live process without metrics for this time counts as silent. Metrics are due every second.
+/// A running process that sends no metrics for this time, in nanoseconds, counts as silent. Processes send metrics every second.
 const SILENT_NANOS: u64 = 5_000_000_000;
 
 /// The state of a process.

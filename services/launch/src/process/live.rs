@@ -29,16 +29,16 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
     })
 }
 
-/// Returns the largest distance of pictures from the instants of the frames without a warning, in nanoseconds: half of the time between
-/// two frames.
+/// Returns the largest difference between the time of a picture and the nominal time of its frame that causes no warning, in nanoseconds:
+/// half of the time between two frames.
 fn max_skew_nanos(resolved: &Resolved) -> u64 {
     let capture = &resolved.deployment.capture;
     let period_ms = 1e3 * capture.frame_step as f64 / resolved.instants_hz();
     (0.5 * period_ms * 1e6).round() as u64
 }
 
-/// Returns the time from the instant of a frame until the picture of the footage was taken, in nanoseconds. The deployment or the
-/// rendered scene gives this time.
+/// Returns the time from the nominal time of a frame until its picture was taken, in nanoseconds, as given by the deployment or the
+/// rendered scene.
 pub(super) fn skew_nanos(resolved: &Resolved, view: usize) -> i64 {
     let camera = &resolved.deployment.cameras[view];
     let of_scene = || Some(skew_ms_of(&Address::parse(&camera.source).ok()?));

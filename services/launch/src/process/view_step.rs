@@ -1,4 +1,4 @@
-//! The single-view step of a camera: a network or the filters search the pictures, or another program's keypoints are read.
+//! The single-view step of a camera: searches the pictures with a network or with filters, or reads another program's keypoints.
 
 use std::sync::Arc;
 

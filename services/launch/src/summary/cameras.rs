@@ -5,7 +5,7 @@ use runfiles::{CameraFit, Contradicted, Exchanged};
 use runtime::metrics::Reading;
 use supervise::Outcome;
 
-/// Returns the text about two cameras whose footage seems to be exchanged.
+/// Returns the text about two cameras whose footage seems to be swapped.
 pub(super) fn exchanged(exchanged: &Exchanged) -> String {
     let [first, second] = &exchanged.cameras;
     format!(
@@ -45,8 +45,8 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     )
 }
 
-/// Returns the counts of every live camera's pictures, one line per camera. The counts of a restarted process begin at its restart. A
-/// warning follows if the times of some cameras cannot be compared with the times of other cameras.
+/// Returns the counts of every live camera's pictures, one line per camera. The counts of a restarted process begin at its restart. If the
+/// picture times of some cameras cannot be compared with those of others, a warning follows.
 pub(super) fn live(outcome: &Outcome) -> String {
     let readings = outcome
         .processes
@@ -118,7 +118,7 @@ fn times(it: &CameraCounts) -> Option<String> {
     }
 }
 
-/// Returns the text about live cameras if only some of them state when their pictures were taken. Returns `None` if all cameras are alike.
+/// Returns a warning if only some live cameras state when their pictures were taken. Returns `None` if all or none of them do.
 ///
 /// * `cameras`: name and counts of each camera.
 fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {

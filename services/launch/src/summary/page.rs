@@ -1,4 +1,4 @@
-//! The page of a run: pictures with skeletons, the skeleton in space, the report of the run, and its latency.
+//! The page of a run: pictures with skeletons, the 3D skeleton, the report of the run, and its latency.
 
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use skeleton::JointSet;
 
 /// Name of the page in the folder of a run.
 pub const FILE: &str = "report.html";
-/// Maximum number of skeletons drawn in space.
+/// Maximum number of skeletons drawn in the 3D view.
 const MOST_MOMENTS: usize = 400;
-/// Number of instants whose pictures are shown.
+/// Number of frames whose pictures are shown.
 const N_STRIPS: usize = 3;
 const JPEG_QUALITY: u8 = 85;
 
@@ -22,7 +22,7 @@ const JPEG_QUALITY: u8 = 85;
 pub(super) struct Content<'a> {
     pub(super) name: &'a str,
     pub(super) verdict: Verdict,
-    /// The report as text. Each line becomes a row.
+    /// The report as text. Each line becomes a row of a table.
     pub(super) text: &'a str,
     pub(super) latency: Option<&'a LatencyReport>,
     pub(super) cameras: &'a [String],
@@ -112,7 +112,7 @@ fn space(folder: &Path, content: &Content<'_>) -> Result<Space, Failure> {
     })
 }
 
-/// Returns results at equal distances in time, as many as can be drawn, with the followed person.
+/// Returns the followed person in as many results as can be drawn, at equal time intervals.
 fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure> {
     let path = folder.join(FrameLine::FILE);
     let lines = || -> Result<_, Failure> {
@@ -147,7 +147,7 @@ fn moments(folder: &Path, content: &Content<'_>) -> Result<Vec<Moment>, Failure>
     Ok(moments)
 }
 
-/// Returns the overlays of instants at the start, in the middle and at the end, for all views.
+/// Returns the overlays of three frames for all views: at the start, in the middle and at the end of the run.
 fn strips(folder: &Path, cameras: &[String]) -> Vec<Strip> {
     let overlays = folder.join("overlays");
     let mut names: Vec<String> = cameras

@@ -1,12 +1,12 @@
-//! Warning that the machine had no time for many frames of a run.
+//! Warning that the machine was too slow for many frames of a run.
 
 use runfiles::Summary;
 
-/// The warning is given if the share of frames with a result is below this.
+/// The warning is given if the fraction of frames with a result is below this value.
 const MOST: f64 = 0.8;
 
-/// Returns a line with the number of frames that the machine had time for, and with advice. Returns `None` if it had time for most frames,
-/// and with lossless delivery.
+/// Returns a line with the number of frames that the machine processed in time, and with advice. Returns `None` if it processed most frames
+/// in time, and always with lossless delivery.
 ///
 /// * `n_frames`: number of frames of the footage that the run reached.
 /// * `seconds`: duration of the run.

@@ -1,4 +1,4 @@
-//! Trust in the results, as text for the user.
+//! Texts for the user about how far the results can be trusted.
 
 use core::fmt::Write as _;
 

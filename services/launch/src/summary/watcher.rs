@@ -1,4 +1,4 @@
-//! The progress of a run.
+//! The progress display of a run.
 
 use core::time::Duration;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! Stores a vertical that was found in pictures beside the rig, because the search takes half a minute.
+//! Stores, in a file beside the rig, a vertical that was found in pictures, because the search takes half a minute.
 
 use std::fs;
 use std::path::{Path, PathBuf};

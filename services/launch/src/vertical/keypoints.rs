@@ -1,7 +1,7 @@
-//! Finds the vertical from keypoints in files: people have their heads above their ankles.
+//! Finds the vertical from keypoints in files: the heads of people are above their ankles.
 //!
-//! In a picture, the head and the ankles of a person define a plane with the camera, and the vertical is in this plane. People
-//! who lean do so in different directions, so the errors cancel over many pictures. No person has to be recognised in two pictures.
+//! In a picture, the head and the ankles of a person define a plane with the camera, and the vertical is in this plane. People who lean do
+//! so in different directions, so the errors cancel over many pictures. People need not be recognised from one picture to the next.
 
 use ::keypoints::Keypoint;
 use deployment::Deployment;
@@ -16,9 +16,9 @@ use crate::keypoints as keypoint_files;
 const MOST_FRAMES: u64 = 60;
 /// Minimum score of a keypoint.
 const LEAST_SCORE: f64 = 0.2;
-/// Minimum number of people in all frames and cameras.
+/// Minimum number of detections of people, over all frames and cameras.
 const LEAST_PEOPLE: usize = 5;
-/// Minimum share of people whose heads are above their ankles.
+/// Minimum fraction of people whose heads are above their ankles.
 const LEAST_AGREEING: f64 = 0.7;
 /// Limit on the median angle between people and the vertical, in degrees.
 const MOST_LEAN: f64 = 25.0;
@@ -31,7 +31,7 @@ struct Standing {
     upward: Vector3<f64>,
 }
 
-/// Finds the vertical. Returns `None` if too few people have heads and ankles, or if they do not agree.
+/// Finds the vertical. Returns `None` if the head and ankles of too few people were found, or if the people do not agree on the direction.
 ///
 /// * `cameras`: the cameras of the deployment that are in its rig.
 pub(super) fn find(
@@ -135,7 +135,7 @@ mod tests {
     use super::super::tests::ring;
     use super::*;
 
-    /// Returns people of 1.7 m who stand at several places and lean by some degrees, as cameras see them.
+    /// Returns the keypoints, in every camera, of people 1.7 m tall who stand at several places and lean by a few degrees.
     fn seen(rolls: &[f64], up: UnitVector3<f64>, lean_degrees: f64) -> Vec<Standing> {
         let world = Rotation3::rotation_between(&Vector3::z(), &up).unwrap();
         let mut all = Vec::new();

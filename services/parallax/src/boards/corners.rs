@@ -8,7 +8,7 @@ use calibration::board::Sight;
 use failure::{ExitKind, Failure};
 use nalgebra::Point2;
 
-/// Limit on the number of a corner.
+/// Upper limit of corner numbers.
 const MOST_CORNERS: usize = 100_000;
 
 /// Sights of all cameras, and the points of the board.

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::corners::without_fraction;
 use failure::{ExitKind, Failure, OrFail as _};
 
-/// Limit on the rows of a table.
+/// Maximum number of rows of a table.
 const MOST_ROWS: usize = 10_000_000;
 
 /// For each camera of a table, the frame of its n-th picture.
@@ -72,8 +72,8 @@ fn table(text: &str) -> Result<FrameTable, String> {
     Ok(FrameTable { frames })
 }
 
-/// Returns the frame of a picture if there is no table. If the frame rates differ, this is the picture's time, counted in intervals of the
-/// slowest camera; otherwise it is the picture's number.
+/// Returns the frame of a picture if there is no table. If the frame rates differ, this is the picture's time in units of the slowest
+/// camera's frame interval. Otherwise, it is the picture's number.
 pub(crate) fn by_clock(index: u64, time_s: Option<f64>, slowest_hz: Option<f64>) -> usize {
     match (time_s, slowest_hz) {
         (Some(time_s), Some(rate_hz)) => (time_s * rate_hz).round().max(0.0) as usize,

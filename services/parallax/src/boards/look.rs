@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::frames::{beside, by_clock, slowest};
 use super::{CameraFootage, FrameTable, Looked, Seen, footage_failure};
 
-/// A property of a camera's pictures (mirrored, inverted) is assumed for all pictures of the camera after this many pictures agree.
+/// Number of pictures that must agree on a property (mirrored, inverted) before it is assumed for all pictures of the camera.
 const SURE: usize = 3;
 
 /// Settings of the search.
@@ -243,7 +243,7 @@ fn agreed(finder: &Finder, raw: Vec<Raw>) -> Looked {
     for it in raw.iter().flat_map(|camera| &camera.found) {
         votes[it.found.variant] += it.found.corners.len();
     }
-    // With equal votes, the first variant wins, which is the board that the user named.
+    // If votes are equal, the first variant is chosen, which is the board that the user named.
     let best = (0..votes.len()).rev().max_by_key(|i| votes[*i]).unwrap_or(0);
     let variant = &finder.variants()[best];
     let cameras = raw.into_iter().enumerate().map(|(camera, raw)| {

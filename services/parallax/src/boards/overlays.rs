@@ -1,4 +1,4 @@
-//! The pictures with the largest residuals. Detected and expected corners are drawn into them.
+//! The pictures with the largest residuals, in which the detected and expected corners are drawn.
 
 use calibration::board::{Outcome, Residual};
 use failure::Failure;

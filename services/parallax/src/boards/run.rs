@@ -18,8 +18,8 @@ const WORST: usize = 8;
 /// Number of pictures per camera that are searched for other boards if the named board is not found.
 const GUESSED_PICTURES: usize = 6;
 
-/// Minimum number of pictures of each side that prove that a board has two sides. One camera sees both sides, or two cameras see one side
-/// each.
+/// Number of pictures of each side that are needed to prove that a board has two sides. The pictures may be from one camera that sees both
+/// sides, or from two cameras.
 const LEAST_OF_EACH: usize = 3;
 
 /// Settings of a calibration from a board.
@@ -50,15 +50,15 @@ pub struct BoardSettings {
 /// The back of a board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Back {
-    /// The mirror image of the front: each corner is at the same place on both sides.
+    /// The mirror image of the front: seen through the board, each corner on the back coincides with the same corner on the front.
     Mirrored,
-    /// Blank. If codes look mirrored, the picture is mirrored.
+    /// The back is blank. If the codes in a picture look mirrored, the picture itself is mirrored.
     Blank,
 }
 
 /// Explanation of mirrored codes.
 enum Mirrored {
-    /// The explanation is known: no mirrored codes were seen, an option explains them, or a camera saw both sides.
+    /// Nothing needs to be decided: no mirrored codes were seen, an option explains them, or a camera saw both sides.
     Known,
     /// Either the board has two sides, or the pictures of these cameras are mirrored. The adjustment decides which.
     Asked(Vec<usize>),
@@ -83,7 +83,7 @@ pub struct Calibrated {
 ///
 /// # Errors
 ///
-/// Fails if inputs cannot be read or do not fit one another, or if [`adjust`] refuses them. Each message says what to try.
+/// Fails if inputs cannot be read or are inconsistent, or if [`adjust`] refuses them. Each message says what to try.
 pub fn calibrate(
     settings: &BoardSettings,
     stop: &Stop,
@@ -188,9 +188,9 @@ fn sighted(
     Ok((Some(looked), sights, points, sizes))
 }
 
-/// Explains mirrored codes. Mirrored codes are right if the back of the board shows the mirror image of the front: a camera behind the
-/// board then sees every corner at its place. In mirrored footage, mirrored codes are an error, unless the user says that the footage is
-/// mirrored. The board is then replaced by its mirror image.
+/// Explains mirrored codes. They are correct if the back of the board shows the mirror image of the front, because a camera behind the
+/// board then sees every corner at its true position. They are an error if the footage is mirrored, unless the user says so. In that case,
+/// the board is replaced by its mirror image.
 fn mirrored(
     settings: &BoardSettings,
     looked: &Looked,
@@ -233,8 +233,8 @@ fn mirrored(
     Ok(Mirrored::Known)
 }
 
-/// Returns true if the cameras that see the back of the board are behind it, according to the cameras that see the front. If instead the
-/// pictures are mirrored and the board has one side, every picture gives a different camera position.
+/// Returns true if the cameras that see the back of the board are behind it, according to the cameras that see the front. If the board has
+/// only one side and the pictures are mirrored, every picture gives a different camera position.
 fn sides_agree(outcome: &Outcome, behind: &[usize]) -> bool {
     let crosses = |pair: &&Together| {
         pair.cameras.iter().filter(|camera| behind.contains(camera)).count() == 1
@@ -424,7 +424,7 @@ impl Calibrated {
     ///
     /// # Errors
     ///
-    /// Fails if the calibration has numbers that no camera can have.
+    /// Fails if the calibration contains values that are impossible for a camera.
     pub fn rig(&self) -> Result<Rig, Failure> {
         let cameras: Vec<Camera> =
             self.outcome.cameras.iter().map(|camera| camera.camera.clone()).collect();

@@ -273,7 +273,7 @@ fn check(rig: &Rig, detections: Option<&Path>, as_json: bool) -> Result<ExitCode
     })
 }
 
-/// Formats the numbers of a rig that can be compared with a tape measure.
+/// Formats the distances in a rig that the user can check with a tape measure.
 fn survey_text(survey: &Survey) -> String {
     let mut lines = vec![format!("{} cameras", survey.cameras.len())];
     for place in &survey.cameras {

@@ -9,7 +9,7 @@ use runtime::{Namespace, Remains, deployments};
 use serde_json::{Value, json};
 use terminal::output;
 
-/// Shown for a directory that does not belong to a deployment.
+/// Text for a directory that does not belong to a deployment.
 const UNMARKED: &str = "not a deployment: ignored";
 
 /// Options of `parallax status`.

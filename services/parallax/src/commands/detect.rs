@@ -26,10 +26,10 @@ const SIZE: usize = 1280;
 /// Default of `--overlap`.
 const OVERLAP: f64 = 0.1;
 
-/// Default threshold of the shipped model, if its parts are printed. The value was chosen by measurement.
+/// Default threshold of the shipped model if its parts are reported, chosen by measurement.
 const SHIPPED_THRESHOLD: f64 = -0.5;
 
-/// Default of `--heat` if the shipped detector finds the boxes.
+/// Default value of `--heat` if the shipped detector finds the boxes.
 const LEAST_HEAT: f64 = 0.5;
 
 /// Options of `parallax detect`.
@@ -147,7 +147,7 @@ impl Arguments {
     ///
     /// Fails if an option of the filters is given with a network, or the other way round.
     fn network(&self) -> Result<Option<&Path>, Failure> {
-        /// Number of options, from the first in the list, that also choose the filters.
+        /// Number of options at the beginning of the list that also select the filters.
         const N_IMPLY: usize = 3;
         let of_filters = [
             (self.joints.is_some(), "--joints"),
@@ -319,7 +319,7 @@ impl Detector<'_> {
     ///
     /// # Errors
     ///
-    /// The inner failure concerns only this file: the other files can still be searched. The outer failure ends the command.
+    /// An inner error concerns only this file, so that other files can still be searched. An outer error ends the command.
     fn file(
         &self,
         path: &Path,

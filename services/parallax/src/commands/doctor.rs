@@ -12,7 +12,7 @@ use terminal::output;
 
 /// Recommended shared memory, in bytes: twice as much as four cameras of 640x480 pixels need with the shipped network.
 const SHARED_MEMORY: u64 = 512 << 20;
-/// Recommended limit on open files. In a deployment of eight cameras, no process has more files open.
+/// Recommended limit on open files. No process of a deployment with eight cameras has more files open.
 const OPEN_FILES: u64 = 1024;
 /// Recommended stack size of the main thread, in bytes.
 const STACK: u64 = 1 << 20;
@@ -134,7 +134,7 @@ fn processor() -> Finding {
 
 /// Checks that a program can be run.
 ///
-/// * `without`: state of the finding if the program is missing.
+/// * `without`: state to report if the program is missing.
 fn program(name: &'static str, without: State) -> Finding {
     let run = Command::new(name).arg("-version").output();
     match run {

@@ -102,7 +102,7 @@ enum Names {
     Opensim,
 }
 
-/// A list of formats. The alias lets clap parse it from one argument.
+/// A list of formats. Because of the alias, clap parses the list from a single argument.
 type Formats = Vec<Format>;
 
 fn formats(text: &str) -> Result<Formats, String> {
@@ -203,7 +203,7 @@ fn beside(source: &Path) -> PathBuf {
     source.with_file_name(format!("{name}-export"))
 }
 
-/// Describes the people that have joints, each with its number of frames.
+/// Describes the people that have joints, with the number of frames of each.
 fn found(trials: &[Trial]) -> String {
     if let [only] = trials {
         let found = format!("{} of them have joints", only.n_with_points());

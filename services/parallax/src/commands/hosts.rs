@@ -68,10 +68,10 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the fusing host,
-/// which also gives the time at which the run began. Returns `None` on a stop request.
+/// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the fusing host, which also
+/// gives the time at which the run began. Returns `None` on a stop request.
 ///
-/// * `chosen`: the host that the user named, and true if nothing is to be started.
+/// * `chosen`: the host that the user named, and whether the command only checks (true) or starts the host (false).
 pub(crate) fn resolve(
     deployment: &Deployment,
     (named, is_dry): (Option<&str>, bool),
@@ -131,7 +131,7 @@ fn status(arguments: &StatusArguments) -> Result<ExitCode, Failure> {
     let host = host.ok_or("the deployment has no [[host]]").or_fail(ExitKind::Usage)?;
     in_one_thread()?;
     let mut address = hosts::address(deployment, host)?;
-    // On the fusing host, the bridge listens already, so this command connects to it.
+    // On the fusing host, the bridge already listens on the address, so this command connects to the bridge.
     address.listens = false;
     let text = bridge::status(&address, PATIENCE).or_fail(ExitKind::Run)?;
     let Some(text) = text else {

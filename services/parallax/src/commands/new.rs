@@ -84,7 +84,7 @@ pub(crate) struct Arguments {
     dry_run: bool,
 }
 
-/// Name of the rig file that has only lenses.
+/// Name of the rig file that contains only intrinsics.
 const LENSES: &str = "lenses.toml";
 
 /// A command, and the file that exists once the command has succeeded.
@@ -290,7 +290,7 @@ fn deployment_text(arguments: &Arguments) -> Result<String, Failure> {
     Ok(text)
 }
 
-/// Position of a camera's footage in the calibrated picture.
+/// Position of a camera's footage within the calibrated picture.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Offset {
     camera: String,

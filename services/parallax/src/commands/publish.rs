@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Parses the targets. Targets on other machines are refused, or reported if `beyond` is true.
+/// Parses the targets. A target on another machine is refused, unless `beyond` is true; then it is only reported.
 fn targets(texts: &[String], beyond: bool) -> Result<Vec<Target>, Failure> {
     let mut targets = Vec::new();
     for text in texts {

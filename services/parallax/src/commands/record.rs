@@ -15,7 +15,7 @@ use terminal::{Globals, output};
 use super::hosts;
 use disk_space::{Forecast, Growth, PerFrame};
 
-/// Files of an earlier recording are looked up for this many epochs of the recording process.
+/// Number of epochs (restarts) of the recording process for which files of an earlier recording are looked up.
 const MAX_EPOCHS: u32 = 64;
 
 /// Options of `parallax record`.
@@ -176,7 +176,7 @@ fn forecast(planned: &Planned, file: &Path, arguments: &Arguments) -> Result<For
 ///
 /// # Errors
 ///
-/// Fails if a file exists and `force` is not set. Also fails if it is a folder, or another run is recording to it.
+/// Fails if a file exists and `force` is not set, if it is a folder, or if another run is recording to it.
 fn remove_existing(file: &Path, force: bool) -> Result<(), Failure> {
     let files = (0..MAX_EPOCHS).map(|i| record::file_of_life(file, i));
     for file in files.filter(|file| file.exists()) {

@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         output::message(recorded::text(&file, &recording));
     }
     let mut settings = recorded::settings(&file, &recording)?;
-    // A replay runs on one machine, even if several hosts recorded the run.
+    // A replay runs on a single machine, even if the recorded run used several hosts.
     settings.resolved.deployment.hosts.clear();
     let from = arguments.from;
     live::settle(
@@ -129,7 +129,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::from(kind.map_or(0, ExitKind::status)))
 }
 
-/// Returns the settings of the stages that are run.
+/// Returns the settings of the stages that the replay runs.
 ///
 /// * `recorded`: the settings of the recorded run.
 fn resolve(
@@ -180,7 +180,7 @@ fn refused(key: &str, from: Stage) -> Option<String> {
     is_given.then(|| format!("with --from {from}, the recording determines this value"))
 }
 
-/// Returns the first stage that a setting affects, or `None` if the recording does not depend on it.
+/// Returns the first stage that a setting affects, or `None` if recorded messages do not depend on the setting.
 fn stage_of(key: &str) -> Option<Stage> {
     let (section, name) = key.split_once('.').unwrap_or((key, ""));
     match (section, name) {
@@ -265,7 +265,7 @@ fn check(
 /// Checks that the recording has the frames, evidence or poses of every view. A recording by one of several hosts may lack some of these
 /// messages.
 ///
-/// * `needs`: true if pixels are needed, and true if evidence is needed.
+/// * `needs`: whether pixels are needed, and whether evidence is needed.
 fn check_views(
     file: &Path,
     recording: &Recording,

@@ -164,7 +164,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
             mb(topic.pool_bytes())
         ))?;
     }
-    // The check is the same as before a run.
+    // A run begins with the same check.
     preflight(&plan.topics)?;
     Ok(ExitCode::SUCCESS)
 }

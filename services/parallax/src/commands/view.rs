@@ -122,7 +122,7 @@ pub(crate) fn beside(name: &str) -> Result<view::Companion, Failure> {
     view::Companion::start(&executable, name)
 }
 
-/// Returns what an argument names: a deployment, a folder or a recording.
+/// Returns the deployment, folder or recording that an argument names.
 fn subject(named: Option<&str>) -> Result<Subject, Failure> {
     let Some(named) = named else {
         return Ok(Subject::Deployment(None));
@@ -193,7 +193,7 @@ fn random_token() -> Result<String, Failure> {
 fn end_with_parent(stop: &Stop) -> Result<(), Failure> {
     let stop = stop.clone();
     let wait = move || {
-        // An error also means that the parent is gone.
+        // An error also means that the parent process has ended.
         let _ended = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
         stop.request();
     };

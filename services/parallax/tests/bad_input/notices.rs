@@ -28,7 +28,7 @@ fn a_file_reports_the_origin_of_its_data() {
 
 #[test]
 fn shipped_files_report_the_origin_of_their_data() {
-    // The files are in a folder of their own, as in a fresh clone.
+    // The files are in a separate folder, as in a fresh clone.
     let case = Case::new("oops-clone", &[2; 2], PLAIN);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
     fs::create_dir(case.path("configs")).unwrap();

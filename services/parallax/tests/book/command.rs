@@ -142,8 +142,8 @@ fn words(line: &str) -> Vec<String> {
 
 /// Checks that the executable accepts these arguments.
 ///
-/// The executable parses them itself, followed by `--help`. It refuses unknown arguments and wrong values before it prints the help.
-/// Missing arguments are not refused in this case, so they are compared with the usage line.
+/// The executable parses them itself, followed by `--help`. It refuses unknown arguments and wrong values before it prints the help. With
+/// `--help`, missing arguments are not refused, so the arguments are also compared with the usage line.
 pub(crate) fn check((program, arguments): (Program, &[String])) -> Result<(), String> {
     let mut asked = arguments.to_vec();
     asked.push("--help".to_owned());

@@ -1,4 +1,4 @@
-//! Tests of the rotation that a calibration asks for, and of the frame numbers of pictures.
+//! Tests of the rotation that a calibration requires, and of the frame numbers of pictures.
 
 use geometry::{Camera, Intrinsics, Lens};
 use nalgebra::{Isometry3, UnitQuaternion};

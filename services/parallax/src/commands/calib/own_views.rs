@@ -9,10 +9,10 @@ use geometry::{Framing, OutSize, Rig, RigWatch, SwapWatch};
 use nalgebra::Point2;
 use runfiles::{Facing, ViewLine};
 
-/// The points that one camera found in a frame, in pixels.
+/// The points found in one frame of one camera, in pixels.
 type Points = Vec<[f64; 2]>;
 
-/// Agreement of a rig with the poses of single views.
+/// Comparison of a rig with the poses of single views.
 pub(super) struct Agreement {
     /// Epipolar errors of the cameras.
     pub(super) errors: EpipolarReport,
@@ -109,8 +109,8 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     reported.map(text).collect()
 }
 
-/// Returns the parts that every camera of the rig found alone, frame by frame. Left and right are those of the body if the run knew which
-/// way the person faced.
+/// Returns the parts that every camera of the rig found alone, frame by frame. If the run has determined which way the person faced, left
+/// and right are those of the body.
 fn frames(rig: &Rig, file: &Path) -> Result<Vec<Vec<Option<Points>>>, Failure> {
     let cameras = rig.cameras();
     let mut frames = BTreeMap::<u64, Vec<Option<Points>>>::new();
@@ -165,9 +165,9 @@ mod tests {
         Rig::new((0..4).map(camera).collect(), None, "test").unwrap()
     }
 
-    /// Returns the poses of a walking person as the cameras see them. A camera that sees the person's back exchanges left and right.
+    /// Returns the poses of a walking person as the cameras see them. A camera that sees the person from behind swaps left and right.
     ///
-    /// * `shown`: for every camera, the index of the camera whose pictures it shows.
+    /// * `shown`: for every camera, the index of the camera whose pictures its footage contains.
     fn seen(rig: &Rig, shown: [usize; 4]) -> String {
         let mut text = String::new();
         let random = &mut fastrand::Rng::with_seed(5);

@@ -1,4 +1,4 @@
-//! The pictures in which people fit a rig worst. Seen and expected joints are drawn into them.
+//! The pictures whose joints agree least with a rig. Detected and expected joints are drawn in the pictures.
 
 use calibration::people::Skeletons;
 use calibration::people::misfit::{Fitted, Misfit};
@@ -11,14 +11,14 @@ use super::walk::Walk;
 
 /// Maximum number of pictures per camera, and of all cameras together.
 const MOST: [usize; 2] = [2, 9];
-/// Margin around the person, as a share of the person's size.
+/// Margin around the person, as a fraction of the person's size.
 const MARGIN: f64 = 0.25;
 const JPEG_QUALITY: u8 = 80;
 
 /// Returns the worst pictures, with captions. Cameras that have only keypoints are left out, because they have no pictures.
 ///
 /// * `offsets_s`: seconds to add to the times of each camera. If there is a rig, there is one entry per camera.
-/// * `skeletons`: instants, with the skeleton at each.
+/// * `skeletons`: times, with the skeleton at each time.
 /// * A picture that cannot be read again is left out, and reported.
 pub(super) fn of(
     walk: &Walk,

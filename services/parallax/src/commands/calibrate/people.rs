@@ -14,12 +14,12 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint for a refused result.
+/// Hint for the user if the result is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute, in view of at least two cameras at every moment, \
 moving the arms and turning; check that the intrinsics fit the pictures (`parallax calib show`); if the cameras were not started \
 together, search for clock offsets with --window 2; if nothing helps, calibrate with a board";
 
-/// Hint for a result that is too uncertain.
+/// Hint for the user if the result is too uncertain.
 const CAUTION_HINT: &str = "to improve it, use longer footage in which the person walks through more of the volume, in all directions; the residuals \
 of a run with this rig show how large the errors of joints are";
 
@@ -94,7 +94,7 @@ fn distance(text: &str) -> Result<(String, String, f64), String> {
     Ok((a.to_owned(), b.to_owned(), metres.ok_or_else(expected)?))
 }
 
-/// Fails if the scale of the rig is to be kept, but the rig has only lenses.
+/// Fails if the scale of the rig is to be kept, but the rig contains only intrinsics.
 fn has_places(arguments: &WalkArguments) -> Result<(), Failure> {
     let deployment = load::read(&arguments.config, &arguments.set)?.deployment;
     let rig = inputs::rig_of(&deployment)?;
@@ -229,7 +229,7 @@ fn settings(arguments: &Arguments, walk: &Walk) -> Result<Settings, Failure> {
     })
 }
 
-/// Describes how the vertical was found.
+/// Returns a description of how the vertical was found.
 fn vertical(outcome: &Outcome) -> &'static str {
     match outcome.vertical {
         Vertical::Feet => "standing feet",

@@ -14,7 +14,7 @@ use terminal::{Globals, output};
 use super::misfits;
 use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
 
-/// Hint for a refused result.
+/// Hint for the user if the result is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
 or the rig belongs to other cameras, make a new rig: parallax calibrate people";
 

@@ -1,4 +1,4 @@
-//! Common part of `calibrate people` and `calibrate refine`: reads what all cameras saw of people, and writes a rig file.
+//! Common part of `calibrate people` and `calibrate refine`: reads the people seen by all cameras, and writes a rig file.
 
 use std::path::{Path, PathBuf};
 

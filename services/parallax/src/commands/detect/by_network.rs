@@ -18,7 +18,7 @@ use terminal::output;
 use super::Detector;
 use inputs::network::keypoints_json;
 
-/// Boxes that overlap by more than this share belong to the same person.
+/// Boxes that overlap by more than this fraction belong to the same person.
 const SAME: f64 = 0.5;
 
 /// The network that finds keypoints, and the detector of the boxes.
@@ -63,7 +63,7 @@ impl Detector<'_> {
     ///
     /// # Errors
     ///
-    /// The inner failure concerns only this picture. The outer failure ends the command.
+    /// An inner error concerns only this picture. An outer error ends the command.
     pub(super) fn look(
         &self,
         eyes: &Eyes,
@@ -83,7 +83,7 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// Returns the people in the given box or in the detector's boxes, each person once. The person who is seen best comes first.
+    /// Returns the people in the given box or in the detector's boxes, each person once. The person with the highest heat comes first.
     fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
         let mut memory = LookMemory::default();
         if let Some(outline) = self.arguments.outline {

@@ -11,9 +11,9 @@ use runtime::{TopicPlan, free_space};
 
 /// A recording starts only if there is space for this many frames.
 const MIN_FRAMES: u64 = 10;
-/// Size of a skeleton for Foxglove, in bytes.
+/// Size of a Foxglove message with a skeleton, in bytes.
 const SCENE_BYTES: u64 = 24_000;
-/// Interval between messages about the size of the file.
+/// Interval between messages to the user about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
 /// Maximum size of the messages of one instant, over all views, in bytes.
@@ -76,7 +76,7 @@ impl PerFrame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
-    /// True if pixels are left out, and true if evidence is left out.
+    /// Whether pixels are left out, and whether evidence is left out.
     pub without: [bool; 2],
     /// Number of frames; `None` for a run without an end.
     pub n_frames: Option<u64>,

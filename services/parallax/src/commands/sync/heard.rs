@@ -7,7 +7,7 @@ use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};
 
-/// Sampling rate in Hz. Most sounds in a room have frequencies below half of it.
+/// Sampling rate in hertz. Most sounds in a room have frequencies below half of this rate.
 const RATE_HZ: u32 = 8000;
 
 /// Reads the sound of every camera, and compares the times at which sounds begin. Ctrl-C ends the comparison.

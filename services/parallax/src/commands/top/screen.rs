@@ -68,7 +68,7 @@ pub(super) fn show(namespace: &Namespace, stop: &Stop, pause: Duration) -> Resul
 #[derive(Debug)]
 struct Page<'t> {
     lines: Vec<&'t str>,
-    /// Index of the first visible line. Near the end of the text it is lower than requested, so that the last page is full.
+    /// Index of the first visible line. Near the end of the text, it is lower than requested, so that the screen stays full.
     first: usize,
     /// Number of lines that fit on the screen.
     len: usize,

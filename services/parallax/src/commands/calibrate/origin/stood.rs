@@ -1,4 +1,4 @@
-//! Finds the floor below people who stood in a finished run.
+//! Finds the floor from the people who stand on it in a finished run.
 
 use std::path::Path;
 
@@ -12,13 +12,14 @@ use skeleton::PARSE14;
 use statistics::Sorted;
 use terminal::output;
 
-/// Largest distance of the run's skeletons from the joints that its cameras saw, as a share of the person's size in the picture.
+/// Largest accepted distance between the projected skeletons of the run and the joints that its cameras saw, as a fraction of the person's
+/// size in the picture.
 const MOST_OFF: f64 = 0.15;
 /// Minimum number of joints seen in pictures for this check.
 const LEAST_SEEN: usize = 50;
 
-/// Finds the floor, after checking that the run was made with this rig. If the run has several people, only the followed person is used.
-/// The followed person may change, because all people stand on the same floor.
+/// Finds the floor, after checking that the run was made with this rig. If the run has several people, only the followed person is used. It
+/// does not matter if this is not always the same person, because all people stand on the same floor.
 ///
 /// * `rate_hz`: frames per second, if the run has no frame rate.
 pub(super) fn find(rig: &Rig, run: &Path, rate_hz: Option<f64>) -> Result<Floor, Failure> {
