@@ -1,4 +1,4 @@
-//! Common structure of several views of a person, learned from sequences with ground truth.
+//! The relations between several views of a person, learned from sequences with ground truth.
 
 mod report;
 mod split;

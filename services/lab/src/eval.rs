@@ -1,4 +1,4 @@
-//! Evaluation on sequences or pictures with known joints: solves frames, stores results, scores and reports them.
+//! Evaluation on sequences or pictures with known joints: solves frames, stores the results, and reports their scores.
 
 pub mod as_run;
 pub mod evidence;

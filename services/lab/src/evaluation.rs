@@ -1,13 +1,13 @@
 //! The paper's evaluation: compares versions of the method on the same sequence.
 //!
-//! [`Film`] supplies the frames of a sequence. [`Bench`] solves each frame once in every view, and then by every [`Version`].
-//! [`Record`] stores the results, so that a run can be resumed. [`score()`] compares them with the ground truth.
-//! [`Summary`] aggregates the scores, as JSON and as LaTeX ([`latex()`]), with the paper's own numbers beside ours ([`published()`]).
+//! [`Film`] supplies the frames of a sequence. [`Bench`] solves each frame once in every view, and then by every [`Version`]. [`Record`]
+//! stores the results, so that a run can be resumed. [`score()`] compares them with the ground truth. [`Summary`] aggregates the scores, as
+//! JSON and as LaTeX ([`latex()`]), with the paper's own numbers beside ours ([`published()`]).
 //!
 //! [`Pictures`] are single pictures of annotated people. [`joints_by`] solves a frame from the keypoints of a network by each of the
 //! compared methods. [`Stress`] is a disturbance that is added on purpose.
 //!
-//! Solving and scoring are separate: other thresholds or another ground truth need no second run.
+//! Solving and scoring are separate, so results can be scored again with other thresholds or another ground truth.
 
 pub mod page;
 

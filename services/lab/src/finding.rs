@@ -37,11 +37,11 @@ pub struct Sources {
     pub scenes: Scenes,
 }
 
-/// One block of photographs out of this number is held out, and one subject of scenes out of this number.
+/// One in this many blocks of photographs is held out, and one in this many subjects of the scenes.
 const KEPT: usize = 12;
 /// Number of consecutive photographs that are held out together, because neighbouring photographs often show the same event.
 const BLOCK: usize = 20;
-/// Margin for hands, feet and hair around the joints, on each side, as a share of the longer side of the box.
+/// Margin for hands, feet and hair on each side of the box around the joints, as a fraction of the box's longer side.
 const BEYOND: f64 = 0.05;
 
 /// Training pictures and held-out pictures.

@@ -1,7 +1,7 @@
 //! Forecast of the resources that cameras and hosts need: processor time, network, latency. It is computed from measured costs.
 //!
-//! Frames arrive at a fixed rate, so there is no random queueing (as in M/D/1). A process waits only while other processes of its host use
-//! the cores. A host is full when its processes use all of its cores.
+//! Frames arrive at a fixed rate, so there is no random queueing (unlike in an M/D/1 queue). A process waits only while other processes of
+//! its host use the cores. A host is full when its processes use all of its cores.
 
 use serde::Serialize;
 
@@ -58,7 +58,7 @@ pub struct Forecast {
     pub bytes_s: [f64; 2],
     /// Latency from capture to result in milliseconds, if the load fits.
     pub latency_ms: f64,
-    /// The part of this latency that the link causes: codec and network.
+    /// The part of this latency that is due to the link between hosts: JPEG codec and network.
     pub link_ms: f64,
     /// True if every host has enough cores and the network has enough capacity.
     pub fits: bool,

@@ -23,7 +23,7 @@ const FEWEST: usize = 20;
 pub struct Learned {
     /// Content of the file.
     pub file: JointFile,
-    /// Settings that were tried: reach, ridge, and the error in every data set on people who were left out.
+    /// Settings that were tried: reach, ridge, and the cross-validation error in every data set.
     pub tried: Vec<multiview::learned::Tried>,
 }
 
@@ -126,7 +126,7 @@ fn found(
     Ok(sets)
 }
 
-/// Returns the best detection on the person, if there is one.
+/// Returns the best detection that covers the person, if there is one.
 fn marked(search: &Search, person: &Person) -> Result<Option<Marked>, Failure> {
     let [_, on_person] = judged::find(search, person)?;
     let centres = on_person.and_then(|on_person| on_person.try_into().ok());

@@ -14,10 +14,10 @@ use statistics::score::{
 };
 use training::datasets::{People, Person, Picture};
 
-/// Largest number of detections among which the detection on the person is searched.
+/// Largest number of detections that are searched for one that covers the person.
 const MOST: usize = 10_000;
 
-/// Smallest share of a person's box that a detection must cover to be on the person.
+/// Smallest fraction of a person's box that a detection must cover to count as a detection of that person.
 const COVERED: f64 = 0.3;
 
 /// A model and its map from parts to joints.
@@ -112,7 +112,7 @@ pub fn check(model: &fmp::Model, name: &str) -> Result<(), Failure> {
     Err(Failure::new(ExitKind::Input, message))
 }
 
-/// Returns the true joints of a person. There are always 14: data sets with another number are refused.
+/// Returns the true joints of a person. There are always 14, because data sets with another number are refused.
 pub(crate) fn truth(person: &Person) -> Joints {
     core::array::from_fn(|i| person.joints.get(i).copied().unwrap_or([f64::NAN; 2]))
 }
@@ -120,7 +120,7 @@ pub(crate) fn truth(person: &Person) -> Joints {
 /// Centres of the parts of a detection, in pixels.
 pub(crate) type Centres = Vec<[f64; 2]>;
 
-/// Returns the best detection, and the best one on the person.
+/// Returns the best detection in the picture, and the best detection that covers the person.
 pub(crate) fn find(search: &Search, person: &Person) -> Result<[Option<Centres>; 2], Failure> {
     let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
     let size = picture.size();

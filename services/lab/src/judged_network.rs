@@ -15,21 +15,21 @@ const NECK: usize = 12;
 /// Index of the top of the head in `skeleton::PARSE14`.
 const HEAD: usize = 13;
 
-/// A network, and the method to find its boxes.
+/// A network, and the method that finds the boxes for its input.
 #[derive(Debug)]
 pub struct NetworkReader {
     /// The network.
     pub network: PoseNetwork,
     /// Meaning of left and right in the labels.
     pub sides: Sides,
-    /// Detector that finds the boxes; without it, the box around the marked joints is used.
+    /// Detector that finds the boxes. Without it, the boxes around the marked joints are used.
     pub finder: Option<Detector>,
 }
 
 /// Joints that a network found on people.
 #[derive(Debug)]
 pub struct Seen {
-    /// The joints at the maxima of the maps: the first of [`Pictures::found`].
+    /// The joints at the maxima of the maps, which are the first entries of [`Pictures::found`].
     pub pictures: Pictures,
     /// Errors of the joints with a mark and a maximum, for each person.
     pub errors: Vec<Vec<JointError>>,
@@ -38,16 +38,16 @@ pub struct Seen {
 /// True and expected error of a joint at the maximum of its map.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointError {
-    /// Expected error ([`JointMaps::expected_px`]), as a share of the height of the network's window.
+    /// Expected error ([`JointMaps::expected_px`]), as a fraction of the height of the network's window.
     pub expected: f64,
-    /// True error, as a share of the same height.
+    /// True error, as a fraction of the same height.
     pub error: f64,
     /// True error in head lengths, from the marked top of the head to the marked neck.
     pub in_heads: f64,
 }
 
 impl JointError {
-    /// Returns true if the true error is more than half a head.
+    /// Returns true if the true error is more than half a head length.
     pub fn is_far(&self) -> bool {
         self.in_heads > 0.5
     }
@@ -136,7 +136,7 @@ impl NetworkReader {
     }
 }
 
-/// Returns the joints at the maxima of their maps; not finite if the keypoints do not determine a joint.
+/// Returns the joints at the maxima of their maps. A joint that the keypoints do not determine is not finite.
 fn at_peaks(peaks: &[Option<Keypoint>]) -> Joints {
     core::array::from_fn(|joint| {
         let peak = peaks.get(joint).copied().flatten();

@@ -1,4 +1,4 @@
-//! Jobs from files to files: trainings, evaluations, models on pictures, synthetic sequences.
+//! Jobs that read and write files: training, evaluation, application of models to pictures, synthetic sequences.
 //!
 //! Except for the [`evaluation`], the algorithms are in other crates. This crate supplies files, threads, a [`Stop`](failure::Stop) and a
 //! [`Console`](failure::Console). It turns errors into a [`Failure`](failure::Failure) with an exit status and a hint.

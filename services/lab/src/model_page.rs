@@ -1,4 +1,4 @@
-//! A model as one HTML page with explanations: filters, tree, springs, biases, numbers.
+//! A model shown and explained on one HTML page: its filters, tree, springs, biases and numbers.
 //!
 //! The page has no script. It is also well-formed XML, so the tests read it as XML.
 
@@ -16,10 +16,10 @@ use figure::Figure;
 
 /// Draws a model. The page shows:
 ///
-/// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along
-///   the edges that they respond to.
-/// * The whole body twice in an ordinary posture: as filters, and as a tree with springs. A spring is drawn as the ellipse on which the
-///   score is [`SPRING_COST`] below the best score.
+/// * Every filter as a glyph: for each cell, the positive weights of its nine orientations, as strokes along the edges that they respond
+///   to.
+/// * The whole body in an ordinary posture, drawn twice: as filters, and as a tree with springs. A spring is drawn as the ellipse on which
+///   the score is [`SPRING_COST`] below the best score.
 /// * For each part, the springs of all types and the biases of all pairs of types.
 ///
 /// Parts and types are counted from 1, as in everything that users see.
@@ -55,7 +55,7 @@ pub fn html(model: &Model) -> String {
     page.into_page()
 }
 
-/// Loss of score on the ellipse that is drawn for a spring.
+/// Loss of score at the ellipse that is drawn for a spring.
 pub const SPRING_COST: f64 = 0.05;
 
 /// Styles of this page, in addition to the common styles.

@@ -1,7 +1,7 @@
 //! Training of the network that sees in which direction a person faces.
 //!
-//! The people come from two sources: photographs with marked joints, if left and right are sides of the body, and
-//! synthetic scenes, which are searched as in the pipeline.
+//! The people come from two sources: photographs with marked joints in which left and right are sides of the body, and synthetic scenes,
+//! which are searched as in the pipeline.
 
 mod marked;
 mod rendered;
@@ -25,7 +25,7 @@ pub struct Job {
     pub datasets: Vec<PathBuf>,
     /// Selections of people to use; all people if empty. A selection may name its data set: `DATASET=SELECTION`.
     pub only: Vec<String>,
-    /// Selections of people for the evaluation, who are left out of the training.
+    /// Selections of people who are used for the evaluation, and left out of the training.
     pub judge: Vec<String>,
     /// Synthetic scenes for training.
     pub scenes: Scenes,
@@ -42,11 +42,11 @@ pub struct Judged {
     pub on: String,
     /// Number of people.
     pub n: usize,
-    /// Share of people whose direction the network distinguishes from the opposite direction, from 0 to 1.
+    /// Fraction of people, from 0 to 1, for whom the network prefers the true direction to the opposite direction.
     pub right: f64,
     /// 95 % interval of `right` (Wilson).
     pub interval: [f64; 2],
-    /// Mean surprise in nats; 0.693 if the network gives no information.
+    /// Mean cross-entropy in nats; 0.693 (ln 2) if the network gives no information.
     pub surprise: f64,
 }
 

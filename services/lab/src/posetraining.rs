@@ -23,7 +23,7 @@ pub use train::{Pass, train};
 /// Sources of the people for training.
 #[derive(Debug)]
 pub struct People {
-    /// Photographs of annotated people. Left and right are sides of the body. If the choice exchanges them for people seen from behind
+    /// Photographs of annotated people. Left and right are sides of the body. If they are swapped for people seen from behind
     /// (`Sides::Seen`), the marks do not determine the direction in which a person faces.
     pub photographs: Chosen,
     /// For each thread, the networks that act as teachers. The first adds missing joints and corrects wrong marks. The other networks add
@@ -33,9 +33,10 @@ pub struct People {
     pub scenes: Scenes,
 }
 
-/// One block of consecutive people out of this number is held out, and one subject of scenes out of this number.
+/// One in this many blocks of consecutive people is held out, and one in this many subjects of the scenes.
 const KEPT: usize = 12;
-/// Number of consecutive people of a data set who are held out together, because neighbours in a data set often show the same event.
+/// Number of consecutive people of a data set who are held out together, because consecutive entries of a data set often show the same
+/// event.
 const BLOCK: usize = 20;
 
 /// People for training, and held-out people, on whom the expected error is learned.

@@ -13,13 +13,13 @@ use scene::{Action, Flaws, N_EXTRAS, RigChoice, Scene, Settings, View};
 pub struct Scenes {
     /// Number of scenes; each gives several pictures from every camera.
     pub n: u32,
-    /// First and last number of the people in the scenes.
+    /// First and last number of the subjects in the scenes.
     pub subjects: [u64; 2],
     /// Frames of every camera in a scene, some seconds apart.
     pub frames: u16,
-    /// Largest number of other people who stand around the subject, and largest number of people who walk past.
+    /// Largest number of other people who stand around the subject. Also the largest number of people who walk past.
     pub company: u64,
-    /// Folder of photographs without people; they replace every third room as the background.
+    /// Folder of photographs without people, which are the background of every third scene in place of a rendered room.
     pub backdrop: Option<PathBuf>,
     /// Random seed.
     pub seed: u64,
@@ -48,15 +48,15 @@ pub(crate) struct Shown<'a> {
     pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
-    /// Joints of all people in the picture and the number of pixels that show each person, the subject first. Joints are not finite behind
-    /// the camera.
+    /// Joints of every person in the picture, with the number of pixels that show the person. The subject comes first. Joints are not
+    /// finite behind the camera.
     pub(crate) everybody: Vec<(Vec<[f64; 2]>, f64)>,
 }
 
 /// Calls a function on every picture of all scenes, and returns the results in the order of the scenes, whatever the number of threads.
 ///
 /// * `make`: returns the result of one picture; `None` if the picture cannot be used.
-/// * `watch`: called with the number of pictures from a camera, and the number of unusable pictures among them.
+/// * `watch`: called after every camera, with its number of pictures, and the number of unusable pictures among them.
 pub(crate) fn of_pictures<T: Send>(
     scenes: &Scenes,
     make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,
@@ -83,7 +83,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
             height: between(0.8, 2.4),
         },
     };
-    // About half of the cameras are bad.
+    // About half of the cameras have poor image quality.
     let is_bad = between(0.0, 1.0) < 0.5;
     let flaws = Flaws {
         noise: between(1.0, 12.0),

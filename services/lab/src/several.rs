@@ -1,4 +1,4 @@
-//! Evaluation with several people: compares identities and positions with the ground truth, from given detections.
+//! Evaluation with several people: computes identities and positions from given detections, and compares them with the ground truth.
 
 mod everybody;
 mod judge;
@@ -28,7 +28,7 @@ pub struct Run {
     pub association: Vec<Duration>,
 }
 
-/// Follows and solves the people of a set, frame by frame; each frame uses earlier frames only.
+/// Follows the people of a set and computes their joints, frame by frame, without using later frames.
 pub fn run(set: &Shelf) -> Run {
     let settings = Settings {
         max: 8,

@@ -1,4 +1,4 @@
-//! Comparison of smoothing methods on a finished run with the ground truth, at the same instants.
+//! Compares the output of smoothing methods on a finished run with the ground truth at the same times.
 
 use std::path::Path;
 
@@ -24,8 +24,8 @@ pub struct Mean {
     pub interval: [f64; 2],
 }
 
-/// Errors of a method against the ground truth. Means are over joints and instants that every method has, except for
-/// filled positions.
+/// Errors of a method against the ground truth. Except for filled positions, means are over the joints and times for which every method has
+/// a position.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// Name of the method.
@@ -36,34 +36,34 @@ pub struct Row {
     pub velocity_m_s: Option<Mean>,
     /// Error of the acceleration by second differences, in m/s².
     pub acceleration_m_s2: Option<Mean>,
-    /// Change of the error between consecutive instants, in mm.
+    /// Change of the error from one frame to the next, in mm.
     pub jitter_mm: Option<Mean>,
     /// Delay of the method, in ms.
     pub lag_ms: Option<Mean>,
-    /// Distance from the true position at instants without a measurement for which the method has a position, in mm.
+    /// Distance from the true position, in mm, where the method has filled in a position without a measurement.
     pub filled_mm: Option<Mean>,
 }
 
 /// Comparison of all methods with the truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
-    /// Number of compared positions: joints times instants.
+    /// Number of compared positions: one for each joint and time.
     pub n_compared: usize,
     /// A row for every method that has positions.
     pub rows: Vec<Row>,
 }
 
-/// The errors of a method at an instant, and the distances at filled positions.
+/// The errors of a method at one time, and the distances of filled positions from the truth.
 type Tried = (Errors, Sum);
 
-/// Compares every smoothing method, and the raw measurements of a finished run, with the ground truth. The truth is of one person; it is
-/// compared with the person who has the lowest identity.
+/// Compares every smoothing method, and the raw measurements of a finished run, with the ground truth. The ground truth is for a single
+/// person. It is compared with the person of the run who has the lowest id.
 ///
 /// * `truth`: a sequence for `parallax-lab eval`: a folder of `parallax-lab synth`, or a description file.
 ///
 /// # Errors
 ///
-/// Fails if the truth cannot be read, has several sequences, or has none of the frames or joints of the run.
+/// Fails if the ground truth cannot be read, has several sequences, or has no frame or joint in common with the run.
 pub fn against(
     run: &Run,
     settings: &finished::Settings,
@@ -77,7 +77,7 @@ pub fn against(
     Ok(compare(&person.recorded, settings, &truth))
 }
 
-/// Returns the true joints at every instant, in the order of the joints; `None` for an unknown joint.
+/// Returns the true joints at every time, in the order of the joints; `None` for an unknown joint.
 fn truth(
     path: &Path,
     recorded: &Recorded,
@@ -131,9 +131,9 @@ fn truth(
 
 /// Compares all methods.
 ///
-/// The bootstrap for the intervals draws blocks of one second.
+/// Confidence intervals are computed by a bootstrap over blocks of one second.
 ///
-/// * `truth`: true positions, by joint and instant.
+/// * `truth`: true positions, by joint and time.
 pub fn compare(
     recorded: &Recorded,
     settings: &finished::Settings,
@@ -156,7 +156,7 @@ pub fn compare(
     }
 }
 
-/// Returns the errors of every method at every instant.
+/// Returns the errors of every method at every time.
 fn tried(
     recorded: &Recorded,
     settings: &finished::Settings,

@@ -30,7 +30,7 @@ pub struct Job {
     pub others: u64,
     /// Number of people who walk past the subject.
     pub passers: u64,
-    /// Actions, one sequence for each; unused with `recording`.
+    /// Actions, with one sequence for each. They are not used if there is a `recording`.
     pub actions: Vec<Action>,
     /// Recorded motion that replaces an action.
     pub recording: Option<Recording>,
@@ -52,8 +52,8 @@ pub struct Job {
     pub live: bool,
     /// Simulated flaws of the cameras.
     pub flaws: Flaws,
-    /// Delay of each camera's pictures after the nominal instants of the frames, in milliseconds; at most one value for each camera of the
-    /// rig.
+    /// Delay of each camera's pictures after the nominal times of the frames, in milliseconds. There is at most one value for each camera
+    /// of the rig.
     pub skews_ms: Vec<f64>,
 }
 
@@ -99,13 +99,12 @@ impl Written {
 
 /// Writes all sequences, on rayon's current pool; the files do not depend on the number of threads.
 ///
-/// A single sequence is written to the folder itself. Several sequences have one folder each, and the annotated people of all sequences are
-/// beside these folders.
+/// A single sequence is written to the folder itself. If there are several sequences, each has its own folder, and the annotated people of
+/// all sequences are beside these folders.
 ///
 /// # Errors
 ///
-/// Fails if a rig, a backdrop or a flaw cannot be used, if a file cannot be written, or on a stop request
-/// ([`ExitKind::Interrupted`]).
+/// Fails if a rig, a backdrop or a flaw cannot be used, if a file cannot be written, or on a stop request ([`ExitKind::Interrupted`]).
 pub fn write(job: &Job, stop: &Stop, console: &dyn Console) -> Result<Done, Failure> {
     let begin = Instant::now();
     let n_cameras = job.rig.rig().map_err(rig_failure)?.cameras().len();
@@ -192,7 +191,7 @@ fn absolute_path(path: &Path) -> PathBuf {
     std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// Converts the error of a rig: a missing rig is an input error, and a rig without an upward direction cannot be used.
+/// Converts the error of a rig. A missing rig is an input error. A rig without an upward direction cannot be used either.
 pub fn rig_failure(error: RigChoiceError) -> Failure {
     let kind = match error {
         RigChoiceError::NoUp | RigChoiceError::Rig(_) => ExitKind::Calibration,

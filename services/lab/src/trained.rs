@@ -28,7 +28,7 @@ pub struct Job {
     pub backend: Backend,
 }
 
-/// Results of some steps of a task.
+/// Results of a pass (a group of training steps) of a task.
 type PassOf<T> = Pass<<T as Task>::Cost, <T as Task>::Score>;
 
 /// Functions that display passes.

@@ -1,4 +1,4 @@
-//! Evaluation of the keypoints of networks on sequences, with networks that are small enough to be written here.
+//! Evaluation of the keypoints of networks on sequences, with networks that are small enough to be defined here.
 
 use crate::common;
 

@@ -150,7 +150,7 @@ fn a_run_among_others_follows_one_person_and_counts_all() {
     );
 }
 
-/// On every machine, no picture is taken before its time, and late pictures are skipped.
+/// The test must pass on machines of any speed: no picture is taken before its time, and late pictures are skipped.
 #[test]
 fn a_live_scene_keeps_up_with_the_clock() {
     let case = case("synth-clock");
@@ -160,7 +160,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
     case.edit("live/deployment.toml", "frames=3", "frames=100000");
     let file = "live/deployment.toml";
     case.edit(file, "synth-s1-walking-1", &case.name);
-    // Long enough for a late view on a loaded machine.
+    // These limits are long enough for a late view on a loaded machine.
     let sets = [
         "capture.size=[160,120]",
         "results.overlay_every=0",
@@ -236,7 +236,7 @@ fn the_ground_truth_is_the_projection_by_the_exact_rig() {
                 let projected = camera.project(&joint.into()).unwrap();
                 let [x, y] = pixel.unwrap();
                 let error = (x - projected.x).hypot(y - projected.y);
-                // A camera with the correct clock sees the joints at their positions at the nominal time.
+                // A camera without delay sees the joints at their positions at the nominal time.
                 assert_eq!(error < 1e-6, late == 0.0, "{}: {error} px", view.camera);
             }
         }

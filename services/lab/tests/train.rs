@@ -73,7 +73,7 @@ struct Drawn {
 }
 
 impl Drawn {
-    /// Draws `n` people to train on, and 8 others; annotates them in `people.jsonl` and `others.jsonl`.
+    /// Draws `n` people to train on and 8 other people, and annotates them in `people.jsonl` and `others.jsonl`.
     fn new(n: usize) -> Self {
         let folder = tempfile::Builder::new().prefix("parallax-").tempdir().unwrap();
         let drawn = Self { folder };

@@ -209,8 +209,8 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
     pose::run(service, &job)
 }
 
-/// Returns the largest number of frames between two frames in which the same person can be followed. It is at least `frame_step`, so that
-/// people are always followed from one used frame to the next.
+/// Returns the largest number of frames between two frames in which the same person can be followed. With any `frame_step`, it is large
+/// enough to follow people from one used frame to the next.
 pub(crate) fn most_apart(resolved: &Resolved) -> Option<f64> {
     let step = resolved.deployment.capture.frame_step as f64;
     let rate_hz = resolved.frame_rate_hz()?;

@@ -12,8 +12,7 @@ use crate::common::started::{processes, signal};
 use crate::maps::{N, joints_at, rig};
 
 const N_PEOPLE: usize = 3;
-/// If a found person is further than this from the true person with the same id, in metres, identities were swapped. The true people are
-/// always further apart.
+/// A found person who is within this distance of a true person, in metres, counts as that person. The true people are always further apart.
 const NEAR_M: f64 = 0.3;
 
 /// Returns the joints of a person who walks on a circle, in metres.

@@ -278,7 +278,7 @@ fn expected(
     Ok((sigma, network))
 }
 
-/// Returns the settings and part-type tables for a sequence.
+/// Returns the fusion settings and the part-type tables for a sequence.
 fn fusion(
     (config, learned, model): (&Config, Option<&Learned>, &Model),
     sequence: &Sequence,
@@ -358,7 +358,7 @@ fn sequences(arguments: &Arguments) -> Result<Vec<Sequence>, Failure> {
             all.push(sequence);
         }
     }
-    // The evaluation of a network does not use the filters.
+    // Options of the filters have no meaning in the evaluation of a network.
     if arguments.evidence.network_evidence.is_none() {
         for warning in height::warnings(&all, arguments.size, arguments.scale) {
             tracing::warn!("{warning}");

@@ -235,7 +235,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Checks the skews of the cameras; empty if all are 0.
+/// Checks the skews of the cameras, and returns them. The list is empty if all skews are 0.
 fn skews_of(skews_ms: &[f64], n_cameras: usize) -> Result<Skews, Failure> {
     if skews_ms.len() > n_cameras {
         let message = format!(

@@ -60,7 +60,7 @@ mod tests {
 
     use super::*;
 
-    /// A rig with one camera; its picture is irrelevant here.
+    /// A rig with one camera, whose image size does not matter here.
     fn rig() -> Rig {
         let camera = geometry::Camera {
             name: "c1".to_owned(),

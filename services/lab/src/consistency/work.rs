@@ -18,13 +18,13 @@ use crate::failures::film_failure;
 
 /// Numbers of bins to compare.
 const BINS: [usize; 5] = [3, 6, 9, 12, 18];
-/// Ridges to compare, in squared sizes of the person.
+/// Ridge parameters to compare, in units of the squared size of the person.
 const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
 
 /// Settings of a training of consistency.
 #[derive(Debug, Clone)]
 pub struct Job {
-    /// Largest number of held-out instants on which weights are tried, evenly spaced over all held-out instants.
+    /// Largest number of held-out frames on which weights are tried. They are evenly spaced over all held-out frames.
     pub tries: usize,
     /// Name of the rig whose camera pairs are also learned by name.
     pub rig: Option<String>,
@@ -51,11 +51,11 @@ pub struct Learning<'a> {
 pub struct Done {
     /// Content of the file.
     pub learned: Learned,
-    /// Number of bins, and the score of tables with this number of bins on the part types of held-out people.
+    /// For each number of bins, how well tables with this number of bins predict the part types of held-out people.
     pub bins: Vec<(usize, Option<f64>)>,
-    /// Ridge, and root mean square error of the joints of held-out people. The first entry is without a map.
+    /// Ridge parameter, and root mean square error of the joints of held-out people. The first entry is the error without a map.
     pub joints: Vec<(Option<f64>, f64)>,
-    /// Score if every view is solved alone.
+    /// Score that is reached if every view is solved alone.
     pub single: Option<Point>,
     /// All weights that were tried, with their scores.
     pub surface: Vec<Point>,
@@ -64,7 +64,7 @@ pub struct Done {
 }
 
 impl<'a> Learning<'a> {
-    /// Prepares the training; its time starts here.
+    /// Prepares the training. The duration of the training is counted from here.
     pub fn new(job: &'a Job, console: &'a dyn Console, model: Arc<Model>, stop: Stop) -> Self {
         Self {
             job,
@@ -119,7 +119,7 @@ impl<'a> Learning<'a> {
         })
     }
 
-    /// Returns some of the held-out instants, evenly spaced.
+    /// Returns some of the held-out frames, evenly spaced.
     fn thinned(&self, held: &[Sequence]) -> Vec<Sequence> {
         let n: usize = held.iter().map(|held| held.frames.len()).sum();
         let most = self.job.tries.min(n);
@@ -128,7 +128,7 @@ impl<'a> Learning<'a> {
             let mut sequence = sequence.clone();
             sequence.frames.retain(|_| {
                 seen += 1;
-                // True if the number of instants to keep has grown by one.
+                // True if the number of frames to keep has grown by one.
                 seen * most / n > (seen - 1) * most / n
             });
             sequence
@@ -147,7 +147,7 @@ impl<'a> Learning<'a> {
         learned.or_fail(ExitKind::Input)
     }
 
-    /// Learns from single views, for each number of bins.
+    /// Learns from the poses of single views, for each number of bins.
     fn look(&self, sequences: &[Sequence], what: &str) -> Result<Vec<Learner>, Failure> {
         let shape = Shape::of(&self.model);
         let learner = |n_bins: usize| {

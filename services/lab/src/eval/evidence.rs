@@ -1,5 +1,5 @@
-//! Evaluation of the keypoints of a network on sequences, with and without disturbances: compares the solution in space with common
-//! methods.
+//! Evaluation of the keypoints of a network on sequences, with and without disturbances: compares the 3D solution over the network's maps
+//! with common methods.
 
 use crate::evaluation::{
     Film, FilmSettings, Method, NetworkView, Stress, cover_half, joints_by, name_sides, parse14,
@@ -17,13 +17,13 @@ use training::datasets::sequences::{Frame, Sequence};
 
 use super::as_run::{self, AsRun};
 
-/// Largest error of a segment's ends at which the segment counts as found, as a share of its length (eq. 13 of the paper).
+/// Largest error of a segment's ends for which the segment counts as found, as a fraction of its length (eq. 13 of the paper).
 const GAMMA: f64 = 0.5;
-/// Largest error of a joint, in metres; a missing joint has this error.
+/// Limit on the error of a joint, in metres. A missing joint counts as having this error.
 const MOST_M: f64 = 2.0;
 /// Number of joints of the limbs, which are the first of `skeleton::PARSE14`.
 const N_LIMB_JOINTS: usize = 12;
-/// Reprojection error above which cameras are left out, as a share of the picture's height. Pose2Sim's default is 15 px, at a height of
+/// Reprojection error above which cameras are left out, as a fraction of the picture's height. Pose2Sim's default is 15 px, at a height of
 /// 1080.
 const LIMIT: f64 = 15.0 / 1080.0;
 
@@ -52,7 +52,7 @@ pub struct EvidenceJob<'a> {
 /// Scores of one method with one disturbance.
 #[derive(Debug, Clone, Default)]
 struct Tally {
-    /// Share of segments that were found, in percent, for each frame.
+    /// Percentage of segments that were found, for each frame.
     found: Vec<Share>,
     /// Errors of the joints of the limbs, in millimetres, for each frame.
     errors: Vec<Share>,
@@ -75,10 +75,10 @@ pub struct EvidenceRow {
     pub limbs_mm: f64,
     /// Confidence interval of `limbs_mm`.
     pub limbs_mm_interval: [f64; 2],
-    /// Difference in PCP3D between the last method of the table and the method of this row, in percentage points, and its interval over the
-    /// same frames.
+    /// PCP3D of the last method of the table minus that of this row, in percentage points, with the confidence interval over the same
+    /// frames.
     pub last_finds_more: [f64; 3],
-    /// Amount by which the last method's mean error is smaller than the mean error of this row, in millimetres, and its interval.
+    /// Mean error of this row minus that of the last method of the table, in millimetres, with its confidence interval.
     pub last_errs_less_mm: [f64; 3],
 }
 
@@ -198,7 +198,7 @@ impl EvidenceJob<'_> {
 
     /// Returns the people that the network finds in a view.
     ///
-    /// * `covered`: the half of the person that is covered.
+    /// * `covered`: the half of the person that is covered, if any.
     fn people(
         &self,
         instant: &Instant<'_>,
@@ -290,7 +290,7 @@ impl EvidenceJob<'_> {
 /// Largest number of people in a view that the network is applied to.
 const MOST_PEOPLE: usize = 4;
 
-/// Chooses the same person in every view, and adds the disturbance. Also returns the cameras as the disturbance leaves them.
+/// Chooses the same person in every view, and adds the disturbance. Also returns the cameras, which the disturbance may have changed.
 fn chosen(
     instant: &Instant<'_>,
     seen: Vec<(usize, Vec<Seen>)>,

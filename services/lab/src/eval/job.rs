@@ -28,8 +28,8 @@ pub type Fusion = (multiview::Settings, PairTables);
 pub struct Job<'a> {
     /// The single-view model.
     pub model: Arc<Model>,
-    /// Returns the fusion settings of a sequence. The number is the scale of its frames: pixels of the frame per pixel of the footage, as
-    /// the mean over its views.
+    /// Returns the fusion settings of a sequence. The number is the scale of the frames: pixels of the frame per pixel of the footage,
+    /// averaged over the views.
     pub fusion: &'a (dyn Fn(&Sequence, f32) -> Result<Fusion, Failure> + Sync),
     /// True to decide for every view whether the person is seen from the front or from behind.
     pub facing: bool,
@@ -55,7 +55,7 @@ pub struct Job<'a> {
     pub forecaster: Option<Mutex<Forecaster>>,
     /// True to use the true errors as the expected errors.
     pub oracle: bool,
-    /// True to continue with the contents of `poses`.
+    /// True to continue an earlier run from the results in `poses`.
     pub resume: bool,
     /// Folder for the results of every frame.
     pub poses: PathBuf,
@@ -290,7 +290,7 @@ impl Job<'_> {
                 joints: sequence.joints,
                 joint_map: (self.joint_map)(sequence.joints),
                 facing: fuse.facing,
-                // The true errors only switch parts on and off: they are not lengths in the frame.
+                // The true errors are not in pixels of the frame, so they are only used to switch parts on and off.
                 error_weight: f64::from(u8::from(!self.oracle)),
                 ..SkeletonSettings::default()
             },

@@ -22,7 +22,7 @@ pub fn is_one(path: &Path) -> bool {
     ending == "jsonl" || ending == "mat"
 }
 
-/// Returns the last component of a path. If this is a file with a well-known name, the component before it is included.
+/// Returns the last component of a path. If it is a file with a standard name, the component before it is included.
 pub fn name(path: &Path) -> String {
     let is_known = path
         .file_name()
@@ -94,7 +94,7 @@ pub fn write_report(
     Ok(numbers)
 }
 
-/// Returns the numbers of one data set as JSON, as in `judge`, with intervals.
+/// Returns the numbers of one data set as JSON, in the same form as `judge` prints, with confidence intervals.
 fn numbers(set: &Pictures, bootstrap: &Bootstrap) -> Value {
     let of = |which: Judged| {
         let mut value = judged::numbers(&set.report(which));

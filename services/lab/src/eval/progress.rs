@@ -1,4 +1,4 @@
-//! Progress display: frames done, and the remaining time.
+//! Progress display: the number of finished frames, and the remaining time.
 
 use std::time::{Duration, Instant};
 

@@ -19,7 +19,7 @@ use skeleton::{JointMap, PARSE14};
 
 use crate::evaluation::{Combining, FrameResult, Terms, Version};
 
-/// Configuration of the bench, without the cameras.
+/// Configuration of the [`Bench`], without the cameras.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The single-view model.
@@ -56,7 +56,7 @@ impl Trial {
     }
 }
 
-/// One view of an instant: its frame and its single-view poses.
+/// One view of a frame: its image and its single-view poses.
 #[derive(Debug, Clone, Copy)]
 pub struct SingleView<'a> {
     /// Index of the view.
@@ -319,7 +319,7 @@ impl Bench {
     }
 }
 
-/// Computing effort of a version.
+/// Computational effort of a version.
 #[derive(Debug, Default)]
 struct Effort {
     iterations: Vec<u32>,

@@ -16,16 +16,16 @@ const N: usize = 14;
 /// Number of maxima in a joint's map that are candidates for the joint.
 const N_MAXIMA: usize = 3;
 
-/// A method to compute joints in space from the views.
+/// A method that computes 3D joints from the views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// Plain triangulation of the maxima ([`linear`]).
     Linear,
     /// Triangulation that leaves out cameras ([`dropping`]).
     Dropping,
-    /// The solution in space over the maps, without springs.
+    /// The 3D solution over the maps of the network, without springs between joints.
     Maps,
-    /// The solution in space over the maps, with springs ([`solve_person`]).
+    /// The 3D solution over the maps of the network, with springs between joints ([`solve_person`]).
     Space,
 }
 
@@ -92,7 +92,7 @@ impl NetworkView {
         *self = Self::new(maps).with_front(self.front);
     }
 
-    /// Returns the person, for finding the same person in other views.
+    /// Returns the data by which the same person is found in other views.
     ///
     /// * `height`: height of the box, as a share of the picture's height.
     pub fn person(&self, height: f64) -> SeenPerson {
@@ -120,11 +120,11 @@ impl JointEvidence for NetworkView {
     }
 }
 
-/// Converts left and right from sides of the picture to sides of the body, in this frame alone. First, the solution in space shows in which
-/// views left and right are exchanged relative to the other views. Then the views' evidence about the front decides whether to exchange all
-/// of them.
+/// Converts left and right from sides of the picture to sides of the body, in this frame alone. First, the 3D solution shows in which views
+/// left and right are swapped relative to the other views. Then the evidence about the direction in which the person faces decides whether
+/// to swap left and right in all views.
 ///
-/// * Returns the log-likelihood ratio of the choice to its opposite, in nats; 0 without a solution.
+/// * Returns the log-likelihood ratio between the chosen assignment and its opposite, in nats; 0 without a solution.
 pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     let settings = SpaceSettings {
         as_seen: true,
@@ -157,9 +157,9 @@ pub fn name_sides(views: &mut [(Camera, NetworkView)]) -> f64 {
     ratio.abs()
 }
 
-/// Returns the joints of `skeleton::PARSE14` in space, in metres.
+/// Returns the 3D joints of `skeleton::PARSE14`, in metres.
 ///
-/// * `limit_px`: limit for [`dropping`].
+/// * `limit_px`: reprojection error above which [`dropping`] leaves out cameras, in pixels.
 pub fn joints_by(
     method: Method,
     views: &[(&Camera, &NetworkView)],
@@ -193,7 +193,7 @@ pub fn joints_by(
     }
 }
 
-/// Returns the positions of a joint in the views. Views with a score near 0 still contribute a direction.
+/// Returns the positions of a joint in the views. Views with a score near 0 are included, because they still contribute a direction.
 fn sightings<'a>(views: &[(&'a Camera, &NetworkView)], joint: usize) -> Vec<Sighting<'a>> {
     let peak = |view: &NetworkView| view.maps.peaks()[joint];
     views

@@ -1,11 +1,11 @@
-//! Frames of a sequence, with all views in step, prepared as in the pipeline.
+//! Frames of a sequence, read for all views together and prepared as in the pipeline.
 
 use footage::{Fill, FootageError, Size, Source, SourceSpec, Warp, WarpError};
 use geometry::{Camera, Framing, FramingError, OutSize, upright_roll};
 use kernels::Rgb8View;
 use training::datasets::sequences::Sequence;
 
-/// Settings to derive frames from footage.
+/// Settings for deriving frames from footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilmSettings {
     /// Width and height of the frames; if `None`, the footage's size times `scale`.

@@ -71,7 +71,7 @@ pub fn overall(summary: &Summary) -> impl Iterator<Item = &Group> {
     summary.groups.iter().enumerate().filter(last).map(|group| group.1)
 }
 
-/// Returns our numbers, with the paper's in parentheses.
+/// Returns our numbers, with the paper's numbers in parentheses.
 fn cells(group: &Group, versions: &[Version]) -> Vec<String> {
     let cell = |(version, it): (&Version, &crate::evaluation::Numbers)| {
         let ours = number(it.pcp3d, 2);

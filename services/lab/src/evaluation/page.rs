@@ -1,4 +1,4 @@
-//! An evaluation as one HTML page: a description of the run, tables with the paper's numbers beside ours, and figures.
+//! An evaluation as one HTML page: a description of the run, tables with our numbers beside those of the paper, and figures.
 
 mod figure;
 mod pictures;

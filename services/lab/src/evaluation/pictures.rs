@@ -165,7 +165,8 @@ mod tests {
         core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64])
     }
 
-    /// Three pictures. The person is detected in two of them; in one of these two, the best detection is elsewhere.
+    /// Three pictures. The person is detected in two of them, but in one of these two, the best detection of the picture is not on the
+    /// person.
     fn pictures() -> Pictures {
         let (here, there) = (Some(person(0.0)), Some(person(500.0)));
         Pictures {

@@ -1,6 +1,6 @@
 //! Common methods to triangulate keypoints of a network: plain triangulation, and triangulation that leaves out cameras.
 //!
-//! The solution in space is compared with these methods. The pipeline does not use them.
+//! They are only compared with the 3D solution of the pipeline; the pipeline does not use them.
 
 use geometry::Camera;
 use nalgebra::{Matrix4, Point2, Point3};
@@ -31,8 +31,8 @@ pub fn linear(views: &[Sighting<'_>]) -> Option<Point3<f64>> {
     point.iter().all(|value| value.is_finite()).then_some(point)
 }
 
-/// Linear triangulation that leaves out as few views as necessary for a mean reprojection error below `limit_px`, as Pose2Sim does. Among
-/// sets of the same size, the set with the smallest error is used.
+/// Linear triangulation that, like Pose2Sim, leaves out as few views as necessary for a mean reprojection error below `limit_px`. Among
+/// sets of the same number of views, the set with the smallest error is used.
 pub fn dropping(views: &[Sighting<'_>], limit_px: f64) -> Option<Point3<f64>> {
     let n = views.len().min(16);
     let mut best: Option<(f64, Point3<f64>)> = None;

@@ -10,7 +10,7 @@ use statistics::score::{area_under_roc, rank_correlation};
 pub struct Predicted {
     /// Expected errors.
     pub sigma_px: Vec<f32>,
-    /// Errors above which parts are switched off; empty if there are no thresholds.
+    /// Thresholds: parts with larger expected errors are switched off. Empty if there are no thresholds.
     pub tau_px: Vec<f32>,
     /// True errors of the single-view pose.
     pub error_px: Vec<f32>,
@@ -23,11 +23,11 @@ pub struct Judgement {
     pub part: String,
     /// Number of evaluated views.
     pub n: usize,
-    /// Share of views in which the error is above the threshold, in percent.
+    /// Percentage of views in which the true error of the part is above the threshold.
     pub above: Option<f64>,
-    /// Share of the views above the threshold in which the part is switched off, in percent.
+    /// Percentage of the views with a true error above the threshold in which the part is switched off (correctly).
     pub caught: Option<f64>,
-    /// Share of the views below the threshold in which the part is switched off, in percent.
+    /// Percentage of the views with a true error below the threshold in which the part is switched off (wrongly).
     pub wasted: Option<f64>,
     /// Area under the ROC curve for "error above the threshold", predicted by the expected error divided by the threshold.
     pub auc: Option<f64>,
@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn predictions_are_judged_by_the_threshold_of_their_own_view() {
-        // The last person is twice as large as the others, and so is the threshold.
+        // The last person is twice as large as the others, and the threshold is twice as high.
         let views = [
             view(5.0, 10.0, 4.0),
             view(15.0, 10.0, 12.0),
@@ -127,7 +127,7 @@ mod tests {
             (all.above, all.caught, all.wasted),
             (Some(50.0), Some(50.0), Some(50.0))
         );
-        // Of four pairs, only (0.9 above, 1.1 below) is in the wrong order.
+        // Of four pairs of samples, only one is in the wrong order: the expected error is 0.9 above the threshold, and 1.1 below it.
         assert_eq!(all.auc, Some(0.75));
         assert_eq!(judged[7].part, PART_NAMES[6]);
         assert_eq!(judged[7].auc, Some(0.75));

@@ -27,7 +27,7 @@ const PCP3D: [Row; 16] = [
 
 /// Returns the paper's value for a row of its tables, in percent; `None` if it has none.
 ///
-/// The rows of UMPM are for all people, so the sequence of one subject represents its action.
+/// The paper's rows for UMPM are averages over all people, so here a sequence with any subject is compared with the row of its action.
 pub fn published(dataset: &str, subject: &str, action: &str, version: Version) -> Option<f64> {
     if version.combining != Combining::Pairs {
         return None;

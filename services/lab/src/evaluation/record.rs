@@ -56,13 +56,13 @@ pub struct FrameResult {
     /// For each view, the 14 joints of `skeleton::PARSE14`, in pixels of the footage; left and right are sides of
     /// the body. `None` if no person was found.
     pub views: Vec<Option<Vec<[f64; 2]>>>,
-    /// Single-view solutions of each pair, or of all views at once.
+    /// Number of single-view solutions for each pair of views (or for all views at once).
     pub iterations: Vec<u32>,
-    /// Number of pairs (or of all-views solutions) that had not converged at the end.
+    /// Number of pairs of views (or of solutions of all views at once) that did not converge.
     pub unsettled: u32,
     /// Total number of single-view solutions, including those of rejected hypotheses.
     pub solutions: u32,
-    /// Share of the consistency terms that were switched on; `None` if there were no terms.
+    /// Fraction of the consistency terms that were switched on; `None` if there were no terms.
     pub on: Option<f64>,
 }
 
@@ -89,7 +89,7 @@ pub enum RecordError {
 ///
 /// A truncated last line is left out.
 ///
-/// * Returns the records and their length in bytes, so that a resumed run can cut off the rest.
+/// * Returns the records and their length in bytes, so that a resumed run can truncate the file there.
 ///
 /// # Errors
 ///

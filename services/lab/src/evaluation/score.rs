@@ -11,24 +11,24 @@ use crate::evaluation::{FrameResult, parse14};
 /// Errors of one version on one frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrameScore {
-    /// Errors of the twelve segments, as shares of their length ([`segment_errors`]).
+    /// Errors of the twelve segments, as fractions of their lengths ([`segment_errors`]).
     pub segments: Vec<Option<f64>>,
     /// Errors of the joints, in metres; infinite for a joint that was not found.
     pub joints_m: Vec<Option<f64>>,
     /// Errors of the joints after the best alignment, in metres; empty if there is no alignment.
     pub aligned_m: Vec<Option<f64>>,
-    /// True if the body fits the truth better with left and right exchanged; `None` if there are no joints to compare.
+    /// True if the body fits the truth better with left and right swapped; `None` if there are no joints to compare.
     pub is_exchanged: Option<bool>,
     /// For each view, the 14 joints that were found (if any) and the true joints, in pixels of the footage. `None` if a true joint is
     /// unknown or behind the camera.
     pub views: Vec<Option<(Option<Joints>, Joints)>>,
-    /// Single-view solutions of each pair, or of all views at once.
+    /// Number of single-view solutions for each pair of views (or for all views at once).
     pub iterations: Vec<u32>,
-    /// Number of pairs (or of all-views solutions) that had not converged at the end.
+    /// Number of pairs of views (or of solutions of all views at once) that did not converge.
     pub unsettled: u32,
     /// Total number of single-view solutions.
     pub solutions: u32,
-    /// Share of the consistency terms that were switched on.
+    /// Fraction of the consistency terms that were switched on.
     pub on: Option<f64>,
 }
 
@@ -65,7 +65,7 @@ pub fn score(sequence: &Sequence, frame: &Frame, found: &FrameResult) -> FrameSc
     }
 }
 
-/// Returns true if the joints fit the truth better with left and right exchanged, by the sum of the distances.
+/// Returns true if swapping left and right makes the sum of the distances from the true joints smaller.
 ///
 /// * `found`, `truth`: joints of `skeleton::PARSE14`, in metres.
 /// * Returns `None` if no pair of left and right joints is both found and known.

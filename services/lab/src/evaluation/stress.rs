@@ -1,5 +1,5 @@
-//! Disturbances that occur in real rooms, added on purpose: part of a person is covered, a camera is rotated, or a view shows another
-//! person.
+//! Simulated disturbances that occur in real recordings: for example, part of a person is covered, a camera was rotated, or a view shows
+//! another person.
 
 use core::fmt;
 use core::str::FromStr;
@@ -11,15 +11,15 @@ use geometry::Camera;
 pub enum Stress {
     /// No disturbance.
     Clean,
-    /// Half of the person is covered with grey in this many views: in turn the left, right, upper or lower half.
+    /// In this many views, half of the person is covered with grey: the left, right, upper and lower half in turn.
     Covered(usize),
-    /// Only this many views exist; they change from frame to frame.
+    /// Only this many views exist. The choice of views changes from frame to frame.
     Views(usize),
     /// One camera was rotated by this many degrees about its vertical axis after the calibration.
     Turned(f64),
     /// One view shows another person: the same person, shifted sideways by half the person's height.
     Bystander,
-    /// Left and right are exchanged in one view.
+    /// Left and right are swapped in one view.
     Exchanged,
 }
 
@@ -45,7 +45,7 @@ impl Stress {
         }
     }
 
-    /// Returns true if a view is disturbed at a frame; the views take turns.
+    /// Returns true if a view is disturbed at a frame. The views are disturbed in turn.
     pub fn hits(self, nth: usize, view: usize, n_views: usize) -> bool {
         let place = (view + nth) % n_views.max(1);
         match self {
@@ -55,7 +55,7 @@ impl Stress {
         }
     }
 
-    /// Returns the camera with the calibration from before it was rotated.
+    /// Returns the camera with the calibration that was made before the camera was rotated.
     pub fn calibrated(self, camera: &Camera) -> Camera {
         let Self::Turned(degrees) = self else {
             return camera.clone();

@@ -1,4 +1,4 @@
-//! Aggregates scores by sequence, by action over all subjects, by subject, and over all.
+//! Aggregates scores by sequence, by action over all subjects, by subject, and over all sequences.
 
 use serde::Serialize;
 use statistics::score::{Bootstrap, Changes, PcpRule, Report, Share};
@@ -11,13 +11,13 @@ const PCK_M: f64 = 0.15;
 const GAMMA: f64 = 0.5;
 /// Number of thresholds in the curves: from 0 in steps of 0.05.
 const N_GAMMAS: usize = 21;
-/// Range of the histogram of changes in both directions, in pixels.
+/// Range of the histogram of changes, in either direction, in pixels.
 const REACH_PX: f64 = 50.0;
 /// Number of bins of the histogram of changes.
 const N_BINS: usize = 40;
 /// Change below which a joint counts as unchanged, in pixels.
 const SAME_PX: f64 = 1.0;
-/// Deterioration above which a joint is also counted separately, in pixels.
+/// Increase of a joint's error above which the joint is also counted separately, in pixels.
 const FAR_PX: f64 = 5.0;
 
 /// Scores of one sequence.
@@ -79,7 +79,7 @@ pub struct Numbers {
     pub gain_interval: Option<[f64; 2]>,
     /// PCP3D of each segment, in percent, in the order of `statistics::score::SEGMENT_NAMES`.
     pub parts: Vec<Option<f64>>,
-    /// PCP3D over the threshold: pairs of threshold and percent.
+    /// PCP3D as a function of the threshold: pairs of threshold and percentage.
     pub curve: Vec<[f64; 2]>,
     /// Mean error of the joints that were found, in mm.
     pub mpjpe_mm: Option<f64>,
@@ -87,41 +87,41 @@ pub struct Numbers {
     pub mpjpe_interval: Option<[f64; 2]>,
     /// Mean error of the joints after the best alignment of every frame, in mm.
     pub aligned_mpjpe_mm: Option<f64>,
-    /// Frames in which left and right of the whole body are exchanged, in percent.
+    /// Percentage of frames in which left and right of the whole body are swapped.
     pub exchanged: Option<f64>,
     /// Confidence interval of `exchanged`.
     pub exchanged_interval: Option<[f64; 2]>,
-    /// Joints with an error of at most 150 mm, in percent; joints that were not found count as wrong.
+    /// Percentage of joints with an error of at most 150 mm. Joints that were not found count as wrong.
     pub pck3d: Option<f64>,
-    /// Joints that could not be triangulated, in percent.
+    /// Percentage of joints that could not be triangulated.
     pub lost: Option<f64>,
-    /// PCP in images by the mean of both ends, in percent.
+    /// PCP in images, in percent, by the mean error of both ends of a segment.
     pub pcp2d: Option<f64>,
     /// PCK in images at a tenth and a fifth of the person's size, in percent.
     pub pck2d: Option<[f64; 2]>,
     /// Mean number of single-view solutions until a pair, or all views, converged.
     pub iterations: Option<f64>,
-    /// Share of pairs (or of all-views solutions) that did not converge, in percent.
+    /// Percentage of pairs of views (or of solutions of all views at once) that did not converge.
     pub unsettled: Option<f64>,
     /// Single-view solutions per frame, over all pairs and hypotheses.
     pub solutions: Option<f64>,
-    /// Consistency terms that were switched off, in percent.
+    /// Percentage of consistency terms that were switched off.
     pub off: Option<f64>,
-    /// Changes from the first version, for each joint in each image.
+    /// Changes of the 2D joints relative to the first version.
     pub changes: ChangesOf,
 }
 
 /// Improvements and deteriorations relative to the first version.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangesOf {
-    /// Joints in images that moved more than a pixel towards the truth, in percent.
+    /// Percentage of 2D joints whose error decreased by more than a pixel.
     pub improved: f64,
-    /// Joints in images that moved more than a pixel away from the truth, in percent.
+    /// Percentage of 2D joints whose error increased by more than a pixel.
     pub deteriorated: f64,
-    /// Joints in images that moved more than five pixels away from the truth, in percent.
+    /// Percentage of 2D joints whose error increased by more than five pixels.
     pub deteriorated_5px: f64,
-    /// Bins of the histogram: the lower edge in pixels (positive values are improvements), and the share of joints in percent. The
-    /// outermost bins include all larger changes.
+    /// Bins of the histogram: the lower edge in pixels (positive values are improvements), and the percentage of joints. The outermost bins
+    /// include all larger changes.
     pub bins: Vec<[f64; 2]>,
 }
 
@@ -180,7 +180,7 @@ pub fn summarise(sequences: &[Measured], versions: &[String], bootstrap: &Bootst
     }
 }
 
-/// Returns the different names, in the order of their first occurrence.
+/// Returns the names without duplicates, in the order of their first occurrence.
 fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<&'a str> {
     let mut all: Vec<&str> = Vec::new();
     for name in names {

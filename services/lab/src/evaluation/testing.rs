@@ -1,5 +1,4 @@
-//! An evaluation with invented numbers, for tests of reports in this crate and, with the feature `testing`, in
-//! others.
+//! An evaluation with invented numbers, for tests of reports in this crate and, with the feature `testing`, in other crates.
 
 use statistics::score::Bootstrap;
 

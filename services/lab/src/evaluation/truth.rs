@@ -14,7 +14,7 @@ pub fn parse14(set: &JointSet, joints: &[Option<Point>]) -> Vec<Option<Point>> {
     PARSE14.joints.iter().map(|joint_of_set| joint(joint_of_set.parts)).collect()
 }
 
-/// Parts of the right side between two joints: part, the parts of both joints, and the weight of the second joint.
+/// Parts of the right side that lie between two joints: the part, the parts at both joints, and the weight of the second joint.
 ///
 /// Source: the annotation of the published models (`PARSE_data`). The left side is a mirror image.
 const BETWEEN: [(usize, usize, usize, f64); 6] = [
@@ -55,12 +55,12 @@ pub fn tenth_of(joints: &[[f64; 2]]) -> f64 {
     0.1 * side(0).max(side(1))
 }
 
-/// Returns the true error of every part in a pose, in tenths of the person's size. This size is the longer side of the
-/// rectangle around the true joints.
+/// Returns the true error of every part in a pose, in tenths of the person's size. This size is the longer side of the rectangle around the
+/// true joints.
 ///
-/// [Adaptive selection](crate::evaluation::Terms::Adaptive) uses these errors if the truth replaces the network. With thresholds
-/// of 1, a part is switched off if its error exceeds a tenth of the person's size. If the model's left and
-/// right may be exchanged (a person seen from behind), the assignment with the smaller errors counts.
+/// [Adaptive selection](crate::evaluation::Terms::Adaptive) uses these errors if the truth replaces the network. With thresholds of 1, a
+/// part is switched off if its error exceeds a tenth of the person's size. If the model may swap left and right (for a person seen from
+/// behind), the assignment with the smaller errors is used.
 ///
 /// * `centres`: centres of the 26 parts, in pixels.
 /// * `joints`: the true joints of `skeleton::PARSE14`, in pixels of the same image.
@@ -74,7 +74,7 @@ pub fn part_errors(
     Some(errors)
 }
 
-/// Returns the errors like [`part_errors`], and true if left and right are exchanged.
+/// Returns the errors like [`part_errors`], and true if left and right are swapped.
 pub fn part_errors_and_facing(
     centres: &[[f64; 2]],
     joints: &[[f64; 2]],

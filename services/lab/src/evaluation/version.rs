@@ -12,20 +12,20 @@ pub enum Terms {
     Geometry,
     /// Part types.
     Appearance,
-    /// Adaptive selection: parts with a large expected error are switched off.
+    /// Adaptive selection: in addition, parts with a large expected error are switched off.
     Adaptive,
 }
 
-/// Method to combine more than two views.
+/// Method that combines more than two views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Combining {
     /// Pairs of views, and the mean of their results, as in the paper.
     Pairs,
     /// Pairs of views, and a consensus of all views.
     Consensus,
-    /// All views at once, the terms of all pairs added up.
+    /// All views at once, with the sum of the terms of all pairs.
     AllViews,
-    /// All views at once; each view is supported by the mean of the other views' terms.
+    /// All views at once, with the mean of the terms of the other views for each view.
     AllViewsMean,
 }
 
@@ -34,7 +34,7 @@ pub enum Combining {
 pub struct Version {
     /// The terms between views.
     pub terms: Terms,
-    /// The method to combine views.
+    /// The method that combines views.
     pub combining: Combining,
 }
 

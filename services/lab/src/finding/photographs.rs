@@ -14,12 +14,12 @@ use super::{Sources, around_joints};
 use crate::failures::dataset_failure;
 use crate::person::read_options;
 
-/// Score of the teacher above which its box counts as a person; boxes with a lower score are ignored.
+/// Score above which a box of the teacher counts as a person. Boxes with a lower score are ignored.
 const SURE: f64 = 0.4;
 /// Overlap above which a box of the teacher shows a marked person: the shared area as a share of the union of both boxes. A box of the
 /// teacher that is mostly within a marked box also counts as the marked person's box.
 const SAME: f64 = 0.4;
-/// Invisible joints of manually marked people can be at any position, even outside the picture.
+/// Largest coordinate of a joint, in pixels. In manual annotations, invisible joints can be at any position, even outside the picture.
 const ANYWHERE_PX: f64 = 1e5;
 
 /// A photograph, and the boxes of the marked people; `None` if it shows no people.
@@ -86,7 +86,7 @@ fn photographs(people: &[Person]) -> Vec<Photograph> {
     all
 }
 
-/// Reads photographs on its own threads; `posetraining` explains why.
+/// Reads photographs on separate threads. The reason is explained in `posetraining`.
 fn read_all(
     photographs: &[Photograph],
     teachers: &[Detector],
@@ -149,7 +149,7 @@ fn name(file: &Path) -> String {
     file.display().to_string()
 }
 
-/// Returns the boxes of the teacher that do not show a marked person.
+/// Returns the boxes of the teacher around people who are not marked.
 fn added(marked: &[[f64; 4]], found: &[PersonBox]) -> Vec<Box4> {
     let others = found.iter().filter(|found| {
         let mut marked = marked.iter();

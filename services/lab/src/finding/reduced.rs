@@ -1,4 +1,4 @@
-//! A picture in the form in which it is stored: not larger than necessary.
+//! A picture in the form in which it is stored: reduced to the necessary size.
 
 use kernels::Rgb8View;
 use training::networks::finder::{Around, Picture, SIDE};

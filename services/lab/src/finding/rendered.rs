@@ -7,7 +7,7 @@ use super::around_joints;
 use super::reduced::reduced;
 use crate::scenes::{Scenes, Shown, of_pictures};
 
-/// Share of a box's pixels that show its person, below which the person counts as hidden. Without occlusion, this share is about a third.
+/// A person counts as hidden if less than this fraction of the pixels in the box show the person. Without occlusion, it is about a third.
 const HIDDEN: f64 = 0.08;
 
 /// Returns the pictures of all scenes, with the numbers of the subjects.

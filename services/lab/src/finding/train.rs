@@ -9,7 +9,7 @@ use training::networks::finder::{self, About, Cost, FinderTask, Score, Settings}
 use super::Prepared;
 use crate::trained::{self, Earlier, Job, Shown};
 
-/// Results of a hundred steps.
+/// Results of a hundred training steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
 /// Trains a network on prepared pictures, and writes it. After every hundred steps, a checkpoint and the curves (`.svg`) are written.

@@ -1,4 +1,4 @@
-//! The whole body in its most ordinary types, drawn as filters and as a tree.
+//! The whole body in an ordinary posture, drawn as filters and as a tree.
 
 use fmp::Model;
 
@@ -148,7 +148,7 @@ impl Figure {
 /// Returns the types of an ordinary posture. Each part has the type whose rest position is nearest to the mean rest position of all its
 /// types. The root has the type that fits the types of its children best. Among equally good types, the first is chosen.
 ///
-/// The types with the largest sum of biases would show a rare posture, whose filters gain most from each other.
+/// The types with the largest sum of biases are not used, because they show a rare posture.
 fn ordinary_types(model: &Model) -> Vec<usize> {
     let parts = &model.spec().parts;
     let mut types = vec![0; parts.len()];

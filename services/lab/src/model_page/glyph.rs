@@ -42,8 +42,8 @@ pub(super) fn of_type(model: &Model, part: usize, mixture: usize) -> Html {
     )
 }
 
-/// Returns the positive weights of every orientation in every cell, `[row][column][orientation]`. The sum is over the features with both
-/// contrasts and without contrast.
+/// Returns the positive weights of every orientation in every cell, `[row][column][orientation]`. The sum is over the contrast-sensitive
+/// and the contrast-insensitive features.
 fn orientations(filter: &Filter) -> Vec<f64> {
     filter
         .weights
@@ -68,7 +68,7 @@ fn strokes(filter: &Filter) -> Html {
     for (at, &weight) in weights.iter().enumerate() {
         let share = if largest > 0.0 { weight / largest } else { 0.0 };
         let step = (share * N_STEPS as f64).floor() as usize;
-        // Strokes of the darkest step would only add clutter.
+        // Strokes with the lowest brightness are not drawn, because they would only add clutter.
         if step == 0 {
             continue;
         }

@@ -30,7 +30,7 @@ impl Ellipse {
     }
 }
 
-/// Returns the child's type and the ellipse of each spring.
+/// Returns, for each spring, the type of the child and the ellipse.
 pub(super) fn ellipses(edge: &Edge) -> Vec<(usize, Ellipse)> {
     match &edge.springs {
         Springs::PerChildType(all) => all.iter().map(Ellipse::of).enumerate().collect(),

@@ -74,7 +74,8 @@ fn every_filter_part_and_pair_of_types_is_drawn() {
 fn no_name_of_a_model_or_a_part_becomes_markup() {
     let page = page(planted("<script>'\"&"));
     assert!(!page.contains("<script"));
-    // The text occurs twice in the title. Every part is in the figure and on its card, and the parent on two cards.
+    // The text occurs twice in the title. The name of every part is in the figure and on the card of the part. The name of the parent is
+    // also on the cards of its two children.
     let escaped = page.matches("&lt;script&gt;&#39;&quot;&amp;").count();
     assert_eq!(escaped, 2 + 3 + 3 + 2);
 }

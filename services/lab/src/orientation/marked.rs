@@ -31,7 +31,7 @@ mod joint {
 
 /// Shortest trunk that is used, in pixels.
 const MIN_TRUNK_PX: f64 = 10.0;
-/// Largest lean of a trunk for which the picture is not rotated, in radians.
+/// Lean of the trunk up to which the picture is not rotated, in radians.
 const MAX_LEAN: f64 = 0.35;
 /// Margin of the box around the parts, in trunk lengths, as in a search.
 const MARGIN: f64 = 0.25;
@@ -39,7 +39,7 @@ const MARGIN: f64 = 0.25;
 const SHOULDERS: f64 = 0.62;
 /// Width of the hips of a person seen from the front, in trunk lengths.
 const HIPS: f64 = 0.38;
-/// Sum of the bends of knees and elbows and the head's lean for a person seen from the side, in trunk lengths.
+/// Horizontal offsets of knees, elbows and head of a person seen from the side, added up, in trunk lengths.
 const BEND: f64 = 0.35;
 
 /// Name of a data set, and its samples.
@@ -146,8 +146,8 @@ fn middle(joints: &[[f64; 2]], a: usize, b: usize) -> [f64; 2] {
 /// Estimates the direction in which a person faces from the joints in the picture: towards the right of the picture, and towards the
 /// camera.
 ///
-/// The visible width of the shoulders and hips shows how much the person faces the camera. The bends of knees, elbows and head show
-/// the sideways component. It is less certain, so the length of the result can be below 1.
+/// The visible width of the shoulders and hips shows how much the person faces the camera. The bends of knees, elbows and head show the
+/// sideways component. This component is less certain, so the length of the result can be less than 1.
 pub(crate) fn front(joints: &[[f64; 2]]) -> [f32; 2] {
     let [x, y] = trunk(joints);
     let length = x.hypot(y);

@@ -1,4 +1,4 @@
-//! Synthetic people, as the search finds them.
+//! Synthetic people, with the poses that the search finds.
 
 use std::sync::Arc;
 
@@ -13,10 +13,10 @@ use super::Work;
 use crate::scenes::{Scenes, Shown, of_pictures};
 use crate::searches::Searches;
 
-/// Largest mean error of the parts for which a pose counts as the person's, as a share of the box's height.
+/// Largest mean error of the parts for which a pose counts as that of the person, as a fraction of the box's height.
 const MAX_ERROR: f64 = 0.12;
 
-/// Returns the samples of all scenes: the best pose in every picture, if it is the person's.
+/// Returns the samples of all scenes: the best pose in every picture, if it is the pose of the subject.
 pub(super) fn samples(
     scenes: &Scenes,
     model: &Arc<Model>,
@@ -74,7 +74,7 @@ fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
     Some(sides[0].min(sides[1]))
 }
 
-/// Returns the direction in which the person faces, from the true joints in space.
+/// Returns the direction in which the person faces, computed from the true 3D joints.
 pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let joints: Vec<Option<Point3<f64>>> = shown
         .in_world

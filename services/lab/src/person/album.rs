@@ -1,4 +1,4 @@
-//! Images for training: decoded, rotated and mirrored on demand.
+//! The images for training, which are decoded, rotated and mirrored on demand.
 
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ impl Gallery {
     ///
     /// # Errors
     ///
-    /// Fails if an image cannot be decoded that was decoded before.
+    /// Fails if an image can no longer be decoded.
     pub(super) fn new(data: &Data, table: &SkeletonTable) -> Result<Self, Failure> {
         let joint_mirror = table.joint_mirror().to_vec();
         let of_person = |(person, (it, angles)): (usize, &(Person, Vec<f64>))| {

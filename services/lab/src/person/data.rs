@@ -176,7 +176,7 @@ pub(crate) fn read_options(
         .collect()
 }
 
-/// Returns the only selection; fails if there are several.
+/// Returns the selection. Fails if there are several.
 fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure> {
     match values {
         [] => Ok(None),
@@ -207,7 +207,7 @@ fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     Ok(angles)
 }
 
-/// Returns the meaning of left and right in a data set; the last value counts.
+/// Returns the meaning of left and right in a data set. If several values are given, the last one is used.
 pub(crate) fn sides_of(values: &[&str]) -> Result<Sides, Failure> {
     let Some(name) = values.last() else {
         return Ok(Sides::default());

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure};
 
-/// Data sets that the value of an option is for.
+/// The data sets to which the value of an option applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Whose<'a> {
     /// All data sets, because the value does not name one.
@@ -13,9 +13,9 @@ pub(super) enum Whose<'a> {
     One(usize, &'a str),
 }
 
-/// Finds the data set that a value is for. This is the data set in `DATASET=VALUE`, as it was written, or otherwise all data sets.
+/// Finds the data sets to which a value applies: the data set that is named in `DATASET=VALUE`, or otherwise all data sets.
 ///
-/// If several data sets match, the longest name wins.
+/// If several names match, the longest one is used.
 pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
     let value_of = |path: &Path| {
         let rest = argument.strip_prefix(path.to_str()?)?;
@@ -32,7 +32,7 @@ pub(super) fn whose<'a>(datasets: &[PathBuf], argument: &'a str) -> Whose<'a> {
 /// Returns the values for each data set.
 ///
 /// * `option`: name of the option, for messages.
-/// * `for_all`: true if a value may be for several data sets.
+/// * `for_all`: true if a value may apply to several data sets.
 ///
 /// # Errors
 ///

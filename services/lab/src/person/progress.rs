@@ -31,7 +31,7 @@ struct State {
     gap: Option<Gap>,
     /// Number of examples in memory, and their bytes.
     held: Option<(usize, usize)>,
-    /// Number of images of people in which the model was placed, number of other images, and the mean score.
+    /// Number of images of people in which the model found a position, number of other images, and the mean score.
     placed: Option<(usize, usize, f64)>,
 }
 
@@ -148,7 +148,7 @@ impl Progress {
         }
     }
 
-    /// Returns the number of images of people in which the final model could not be placed.
+    /// Returns the number of images of people in which the final model found no position.
     pub(super) fn n_lost(&self) -> Option<usize> {
         self.lock().placed.map(|placed| placed.1)
     }

@@ -33,7 +33,7 @@ pub struct Report {
     pub(super) n_resumed: usize,
     /// Total number of steps.
     pub(super) n_steps: usize,
-    /// Number of images of people in which the final model could not be placed.
+    /// Number of images of people in which the final model found no position.
     pub(super) n_lost: Option<usize>,
     /// False alarms.
     pub(super) alarms: Option<Alarms>,

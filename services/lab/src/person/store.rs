@@ -10,7 +10,7 @@ use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Model;
 use training::{Checkpoint, CheckpointBytesError, CheckpointError};
 
-/// Files of one training. While the state is not locked, no file is being written.
+/// Files of one training. The state is locked while a file is being written.
 #[derive(Debug)]
 pub struct Store {
     out: PathBuf,
@@ -184,7 +184,7 @@ impl Store {
             n_steps,
             model_written,
         } = *state;
-        // The lock is never released, so that no more files are written.
+        // The state remains locked, so that no more files are written.
         core::mem::forget(state);
         let stopped = |what: String| Failure::new(ExitKind::Interrupted, what);
         if model_written {
@@ -213,7 +213,7 @@ impl Store {
         self.out.with_file_name(name)
     }
 
-    /// Removes the lock file, if possible. It only served to reserve the model.
+    /// Removes the lock file, if possible. Its only purpose was to reserve the path of the model.
     fn let_go(&self) {
         drop(fs::remove_file(claim_of(&self.out)));
     }

@@ -15,8 +15,8 @@ pub(super) struct Crop {
 }
 
 impl Crop {
-    /// Returns the square around the joints with finite positions: the size of the network's window, with a margin. `None` if the joints
-    /// have no extent.
+    /// Returns the square around the joints with finite positions. It has the size of the network's window, plus a margin. Returns `None`
+    /// if all joints are at the same point.
     ///
     /// * `angle`: clockwise rotation of the picture before cropping, in radians.
     pub(super) fn around(joints: &[[f64; 2]], angle: f64) -> Option<Self> {
@@ -61,7 +61,7 @@ impl Crop {
         1.0 / self.step
     }
 
-    /// Returns the square as RGB. Each pixel is the mean of enough points that no pixel of the picture is skipped.
+    /// Returns the square as RGB. Each pixel is the mean of several points, which are so close that no pixel of the picture is skipped.
     pub(super) fn rgb(&self, picture: Rgb8View<'_>) -> Vec<u8> {
         let n = (self.step.ceil() as usize).clamp(1, 8);
         let mut rgb = Vec::with_capacity(3 * SIDE * SIDE);

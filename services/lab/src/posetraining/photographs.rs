@@ -21,11 +21,12 @@ const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
 const NECK: usize = 12;
 /// Length of the shortest trunk that is used, in pixels of the square picture.
 const MIN_TRUNK: f32 = 8.0;
-/// Largest enlargement, in pixels of the network's window per pixel of the picture: smaller people show too little detail.
+/// Largest enlargement, in pixels of the network's window per pixel of the picture. People who would have to be enlarged more show too
+/// little detail.
 const MOST_ENLARGED: f64 = 4.0;
-/// Distance up to which two findings of the teacher count as the same keypoint, as a share of the window.
+/// Distance up to which two detections of the teacher count as the same keypoint, as a fraction of the window.
 const SAME: f32 = 0.05;
-/// Invisible joints of manually marked people can be at any position, even outside the picture.
+/// Largest coordinate of a joint, in pixels. In manual annotations, invisible joints can be at any position, even outside the picture.
 const ANYWHERE_PX: f64 = 1e5;
 
 type Point = [f32; 2];
@@ -69,8 +70,8 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
 
 /// Returns the usable people, with their positions in the data set.
 ///
-/// The function starts its own threads. Networks run on rayon's threads too. A rayon thread that waits for a network would start on
-/// another person meanwhile, and so on, until its stack overflows.
+/// The function starts its own threads. Networks run on rayon's threads too. While a rayon thread waits for a network, it would start to
+/// process another person, and so on, until its stack overflows.
 fn of_all(
     people: &[Annotated],
     (sides, teachers): (Sides, &[Vec<PoseNetwork>]),
@@ -187,8 +188,8 @@ fn visible(person: &Annotated) -> [[f64; 2]; N_JOINTS] {
     })
 }
 
-/// Returns the direction in which a person faces, from the marks in the upright picture; 0 if it contradicts the order of left and right
-/// at the hips and shoulders.
+/// Returns the direction in which a person faces, from the marks in the upright picture; 0 if this direction contradicts the order of left
+/// and right at the hips and shoulders.
 fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     let marked = |joint: usize| marks.marked[joint].map(f64::from);
     let joints: [[f64; 2]; N_JOINTS] = core::array::from_fn(marked);
@@ -235,8 +236,9 @@ fn length([x, y]: Point) -> f32 {
     x.hypot(y)
 }
 
-/// Returns the mean distance by which the left hip and shoulder are to the right of the right hip and shoulder, in the upright picture. It
-/// is negative for a person seen from behind. Joints without a mark are taken from the teacher; `None` if neither source has them.
+/// Returns the mean distance by which the left hip and shoulder are to the right of the right hip and shoulder, in the upright picture. The
+/// distance is negative for a person seen from behind. Joints without a mark are taken from the teacher. Returns `None` if the teacher does
+/// not have them either.
 fn across(marks: &Marks) -> Option<f32> {
     let widths = PAIRS.iter().filter_map(|[right, left]| {
         let is_marked = [right, left].iter().all(|joint| marks.marked[**joint][0].is_finite());
@@ -315,7 +317,7 @@ fn find(
     }))
 }
 
-/// The pairs of joints must match those of the mirror image.
+/// The pairs of joints must be left-right pairs of the mirror image.
 const _: () = {
     assert!(MIRROR[PAIRS[0][0]] == PAIRS[0][1], "hips");
     assert!(MIRROR[PAIRS[1][0]] == PAIRS[1][1], "shoulders");

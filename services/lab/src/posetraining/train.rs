@@ -9,7 +9,7 @@ use crate::trained::{self, Job, Shown};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 
-/// Results of a hundred steps.
+/// Results of a hundred training steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
 /// Reads the network to start from; `None` for random parameters.

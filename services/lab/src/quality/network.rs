@@ -47,7 +47,7 @@ fn validated(pass: &Pass) -> Validated {
     })
 }
 
-/// Draws two panels: the losses, and below the area under the ROC curve.
+/// Draws two panels: the losses, and below them the area under the ROC curve.
 fn drawn(passes: &[Pass], best: Option<usize>) -> String {
     let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
         name,

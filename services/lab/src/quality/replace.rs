@@ -1,4 +1,4 @@
-//! Files that are always complete.
+//! Files that are replaced as a whole, so that they are always complete.
 
 use std::path::Path;
 

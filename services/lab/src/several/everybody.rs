@@ -21,7 +21,7 @@ const RIGHT_MM: [u32; 6] = [25, 50, 75, 100, 125, 150];
 /// Scores of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Everybody {
-    /// Number of true frames for which the run has a line.
+    /// Number of frames with ground truth for which the run has a line.
     pub frames: usize,
     /// Results for each true person.
     pub people: Vec<ActorReport>,
@@ -30,7 +30,7 @@ pub struct Everybody {
     /// Average precision in percent, for each distance in millimetres up to which a person is correct. People are ordered by the standard
     /// deviations in the run's output.
     pub ap: BTreeMap<u32, f64>,
-    /// Share of the true people for whom the output has a person within half a metre, in percent.
+    /// Percentage of the true people for whom the output has a person within half a metre.
     pub recall: f64,
     /// Number of id changes.
     pub switches: usize,
@@ -56,7 +56,7 @@ struct Candidate {
 /// Evaluates a run.
 ///
 /// * `rate_hz`: true frames per second.
-/// * `lines`: lines of `pose3d.jsonl`. Frames without truth are skipped, and so are true frames without a line.
+/// * `lines`: lines of `pose3d.jsonl`. Frames without ground truth are skipped, and so are frames with ground truth but without a line.
 pub fn everybody(truth: &[Frame], lines: &[FrameLine], rate_hz: f64) -> Everybody {
     let by_number: BTreeMap<u64, &Frame> = truth.iter().map(|frame| (frame.frame, frame)).collect();
     let mut tally = Tally::default();
@@ -182,8 +182,8 @@ fn distance(put: &Joints, there: &Joints) -> f64 {
     each.iter().sum::<f64>() / each.len() as f64
 }
 
-/// Returns the area under the curve of precision over recall, in percent. People of the output come in the order of their certainty. A
-/// person is correct if the nearest true person is close enough and was not matched before.
+/// Returns the area under the curve of precision over recall, in percent. People in the output are ordered by certainty. A person is
+/// correct if the nearest true person is close enough and was not matched before.
 fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f64 {
     let mut taken = std::collections::BTreeSet::new();
     let (mut n_right, mut points) = (0.0, Vec::new());
@@ -196,7 +196,7 @@ fn average_precision(candidates: &[Candidate], n_true: usize, right_m: f64) -> f
         n_right += f64::from(is_right);
         points.push((n_right / n_true.max(1) as f64, n_right / (nth + 1) as f64));
     }
-    // The precision at a recall is the highest precision at this recall or a higher one.
+    // The precision at a given recall is the highest precision at this or any higher recall.
     let (mut area, mut best, mut last) = (0.0, 0.0_f64, points.last().map_or(0.0, |point| point.0));
     for (recall, precision) in points.iter().rev() {
         area += (last - recall) * best;
@@ -276,7 +276,7 @@ mod tests {
         assert!((score.recall - 100.0 * 100.0 / 120.0).abs() < 1e-9);
         assert_eq!(score.ap[&50], 0.0);
         // 100 of the 120 true people are found correctly, and 100 of the 120 people in the output are correct. Before the last frames, the
-        // share is slightly higher.
+        // fraction of correct people is slightly higher.
         assert!((69.4..70.0).contains(&score.ap[&75]), "{:?}", score.ap);
     }
 }

@@ -1,4 +1,4 @@
-//! PCP3D of several people, by the protocol of Shelf.
+//! PCP3D of several people, computed by the protocol of the Shelf data set.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,7 @@ const PARTS: [(&str, [usize; 2]); 10] = [
     ("head", [12, 13]),
     ("torso", [12, 14]),
 ];
-/// Largest mean distance of the joints at which a person of the output can be a true person, in metres.
+/// Largest mean distance between the joints of a person in the output and those of a true person for a match, in metres.
 pub(super) const FOUND_M: f64 = 0.5;
 /// Position of the ears between the neck and the top of the head, as in `keypoints::joint_ways`.
 const EARS: f64 = 1.0 / 1.8;
@@ -38,7 +38,7 @@ pub struct Put {
 }
 
 impl Put {
-    /// Takes the joints unchanged. The head extends from the neck to the top of the head.
+    /// Uses the joints unchanged. The part `head` extends from the neck to the top of the head.
     pub fn plain(id: u64, joints: &Joints) -> Self {
         let mut all = [None; N_TRUE];
         all[..14].copy_from_slice(joints);

@@ -15,7 +15,7 @@ use serde::Deserialize;
 const N_KEYPOINTS: usize = 25;
 /// Number of joints in the truth: the first twelve of `skeleton::PARSE14`, the bottom and the top of the head, and the middle of the hips.
 pub(super) const N_TRUE: usize = 15;
-/// Keypoints at the two ends of OpenPose's 26 part affinity fields.
+/// Keypoints at the two ends of each of OpenPose's 26 part affinity fields.
 const FIELDS: [[usize; 26]; 2] = [
     [
         1, 9, 10, 8, 8, 12, 13, 1, 2, 3, 2, 1, 5, 6, 5, 1, 0, 0, 15, 16, 14, 19, 14, 11, 22, 11,
@@ -31,7 +31,8 @@ const MOST: usize = 1000;
 const LEAST_KEYPOINTS: usize = 5;
 /// Confidence of a keypoint below which it is ignored.
 const LEAST_CONFIDENCE: f64 = 0.05;
-/// Standard deviation of a keypoint with full confidence, as a share of the person's size in the picture; larger for lower confidence.
+/// Standard deviation of a keypoint with full confidence, as a fraction of the person's size in the picture. With lower confidence, the
+/// standard deviation is larger.
 const SD_SHARE: f64 = 0.02;
 
 /// Reason why a set could not be read.
@@ -432,7 +433,7 @@ mod tests {
     #[test]
     fn the_strongest_fields_make_people_and_the_rest_is_loose() {
         let (mut candidates, mut fields) = candidates();
-        // A third right wrist, without a field that leads to it.
+        // A third right wrist, which no field connects to another keypoint.
         candidates[4].push([300.0, 40.0, 0.5]);
         for field in [8, 9].into_iter().filter(|field| FIELDS[1][*field] == 4) {
             fields[field] = vec![0.9, 0.1, 0.0, 0.1, 0.8, 0.0];

@@ -21,7 +21,7 @@ const JPEG_QUALITY: u8 = 95;
 pub enum Format {
     /// PNG, which is lossless.
     Png,
-    /// JPEG, as most cameras write it (quality 95). The files are smaller.
+    /// JPEG with quality 95, as most cameras write it. The files are smaller than PNG files.
     Jpg,
 }
 
@@ -84,7 +84,7 @@ pub(super) fn truth(file: &Path, header: &Header, frames: &[Frame]) -> Result<()
     text(file, &lines)
 }
 
-/// Writes the rig that a user would have, and the exact rig.
+/// Writes the rig that a user would have (with calibration errors, if requested), and the exact rig.
 pub(super) fn rigs(folder: &Path, scene: &Scene) -> Result<(), Failure> {
     let written = scene.written_rig().or_fail(ExitKind::Usage)?;
     for (name, rig) in [("rig.toml", &written), ("rig-exact.toml", scene.rig())] {

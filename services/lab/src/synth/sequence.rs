@@ -145,7 +145,7 @@ impl<'a> Sequence<'a> {
         (0..self.job.n_frames).map(frame).collect()
     }
 
-    /// Returns all people in the pictures; a repetition of the previous picture does not count.
+    /// Returns all people in the pictures. Pictures that repeat the previous picture are not used.
     fn people(&self, frames: &[Frame]) -> People {
         let mut people = People::default();
         if self.job.live {

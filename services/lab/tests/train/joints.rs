@@ -10,7 +10,7 @@ use crate::common::Ended;
 
 /// The knees of a figure, and the hips above them.
 const KNEES: [[usize; 2]; 2] = [[1, 2], [4, 3]];
-/// Distance by which the mark is beyond the knee, as a share of the thigh.
+/// Distance by which the mark is below the knee, as a fraction of the length of the thigh.
 const BEYOND: f64 = 0.25;
 
 impl Drawn {

@@ -71,7 +71,7 @@ pub(crate) fn run(command: &Command) -> Result<ExitCode, Failure> {
 /// Resolves what this machine runs: a whole deployment, or the part of one host. A host with cameras waits for the fusing host, which also
 /// gives the time at which the run began. Returns `None` on a stop request.
 ///
-/// * `chosen`: the host that the user named, and whether the command only checks (true) or starts the host (false).
+/// * `chosen`: the host that the user named, and true for a check that starts nothing.
 pub(crate) fn resolve(
     deployment: &Deployment,
     (named, is_dry): (Option<&str>, bool),

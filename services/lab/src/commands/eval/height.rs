@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use geometry::search_size::{GOOD_PX, USABLE_PX, better_scale, search_sizes};
 use training::datasets::sequences::Sequence;
 
-/// Returns warnings about people who are too tall or too short in the frames, once for all sequences of a rig.
+/// Returns warnings about people whose height in the frames is too large or too small. All sequences of a rig share one warning.
 ///
 /// * `size`: width and height of the frames; if `None`, `scale` times the footage's size.
 pub(super) fn warnings(

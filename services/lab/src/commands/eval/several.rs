@@ -1,4 +1,4 @@
-//! Evaluation of identities, on a set of several people.
+//! Evaluation of identities on a data set with several people in each frame.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! Costs of a run, from the report that it printed.
+//! Costs of a run, read from the report that it printed.
 
 use std::path::Path;
 
@@ -39,7 +39,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
             "the report has {n_frames} frames of {n_views} views, so no costs can be computed"
         ));
     }
-    // Mean time of a process of this service, in milliseconds per frame.
+    // Mean time that a process of this service takes for a frame, in milliseconds.
     let mean = |service: &str| {
         let is_meant = |name: &str| {
             let rest = name.strip_prefix(service);
@@ -64,7 +64,7 @@ fn of_run(report: &Value, hosts: Option<&Value>) -> Result<Costs, String> {
         ..DEFAULT
     };
     let n_pose = spent.keys().filter(|key| key.starts_with("pose-")).count();
-    // If hosts send poses, some poses are found on other hosts.
+    // If hosts send poses, some of the pose processes run on other hosts.
     let carries_poses = n_pose > 0 && n_pose < n_views;
     Ok(hosts.map_or(costs, |hosts| with_link(costs, hosts, carries_poses)))
 }

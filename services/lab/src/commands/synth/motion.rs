@@ -1,4 +1,4 @@
-//! Options for recorded motion, which replaces an action.
+//! Options for recorded motion that replaces an action.
 
 use std::path::PathBuf;
 

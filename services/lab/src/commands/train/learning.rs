@@ -38,7 +38,7 @@ pub(super) struct Learning {
 }
 
 impl Learning {
-    /// Reads the settings file; the defaults if none is given.
+    /// Reads the settings file. Returns the defaults if no file is given.
     pub(super) fn read<T: DeserializeOwned + Default>(&self) -> Result<T, Failure> {
         let Some(file) = &self.settings else {
             return Ok(T::default());

@@ -24,7 +24,7 @@ pub(super) struct Marked {
 }
 
 impl Marked {
-    /// Returns the choice; all other values are the defaults.
+    /// Returns the choice of people. All values without an option are the defaults.
     pub(super) fn chosen(&self) -> Chosen {
         Chosen {
             datasets: self.datasets.clone(),

@@ -1,4 +1,4 @@
-//! Comparison of single views with the truth: the training data of the consistency terms.
+//! Compares single views with the ground truth, to make training data for the consistency terms.
 
 use kernels::Rgb8View;
 use multiview::learned::{Learner, Pair, ViewObservation};

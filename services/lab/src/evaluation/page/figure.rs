@@ -1,4 +1,4 @@
-//! The paper's figures as SVG: bars for every part, curves over the threshold, histograms of changes.
+//! The paper's figures as SVG: bars for every part, curves of PCP3D against the threshold, and histograms of changes.
 
 use crate::evaluation::{ChangesOf, Group};
 use statistics::score::SEGMENT_NAMES;
@@ -126,7 +126,7 @@ pub(super) fn bars(group: &Group, titles: &[String]) -> Html {
     plot.end()
 }
 
-/// Draws PCP3D over the threshold, with a curve for each version.
+/// Draws PCP3D against the threshold, with a curve for each version.
 pub(super) fn curves(group: &Group, titles: &[String]) -> Html {
     let mut plot = Plot::new(420.0, 100.0, "%");
     let ends = group.versions.iter().filter_map(|version| version.curve.last());

@@ -119,7 +119,7 @@ fn the_page_of_pictures_says_every_number_and_escapes_names() {
     let person =
         |x: f64| core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64]);
     let (here, there) = (Some(person(0.0)), Some(person(500.0)));
-    // The person is found in two of three pictures; in one of these two, the best detection is elsewhere.
+    // The person is found in two of three pictures, but in one of these two, the best detection of the picture is not on the person.
     let set = Pictures {
         name: "parse & co".to_owned(),
         n_left_out: 1,

@@ -156,7 +156,7 @@ proptest! {
         let fine = bytes_of(&plan, &settings);
         for changes in all {
             let mut payload = fine[HEADER..].to_vec();
-            // The vector of the model is in the middle; the poses are at the end.
+            // The vector of the model is in the middle of the payload, and the poses are at the end.
             let n_poses = payload.len().min(1500);
             let start = (payload.len() - n_poses).max(WHOSE);
             for (at, value) in changes {

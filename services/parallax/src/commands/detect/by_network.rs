@@ -83,7 +83,7 @@ impl Detector<'_> {
         Ok(Ok(()))
     }
 
-    /// Returns the people in the given box or in the detector's boxes, each person once. The person with the highest heat comes first.
+    /// Returns the people in the given box or in the detector's boxes, each person once. The person with the highest score comes first.
     fn people(&self, eyes: &Eyes, picture: &Picture) -> Result<(Vec<Person>, From), Failure> {
         let mut memory = LookMemory::default();
         if let Some(outline) = self.arguments.outline {
