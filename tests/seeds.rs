@@ -1,5 +1,5 @@
-//! Runs every fuzz target over its seeds and some thousand mutations of them, without nightly and without a
-//! sanitizer. It is a short form of the runs in `fuzz/README.md`.
+//! Runs every fuzz target over its seeds and a few thousand mutations of the seeds, without a nightly toolchain and without a sanitizer.
+//! This is a short version of the runs in `fuzz/README.md`.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stdout, reason = "the input that failed is told")]
@@ -20,7 +20,7 @@ use properties::TARGETS;
 
 /// Number of mutations of a target's seeds.
 const N_MUTATIONS: u64 = 4000;
-/// Time after which a slow target ends with fewer mutations.
+/// Time limit for a slow target, which is then run with fewer mutations.
 const LONGEST: Duration = Duration::from_secs(4);
 
 fn folder() -> PathBuf {
@@ -34,7 +34,7 @@ fn names(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Changes, moves, repeats or removes some bytes of a seed, or takes them from another seed.
+/// Changes, moves, repeats or removes some bytes of a seed, or replaces them by bytes of another seed.
 fn mutate(seed: &[u8], other: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..random.usize(1..6) {

@@ -200,7 +200,7 @@ fn no_files_import_one_another_in_a_circle() {
     }
 }
 
-/// Number of places in the old dialect. It only decreases.
+/// Largest number of places in the sources that may have the style that the module `dialect` counts. It may only be decreased.
 const DIALECT: usize = 50;
 
 #[test]
@@ -220,7 +220,7 @@ fn the_old_dialect_goes() {
 
 #[test]
 fn no_test_is_ignored_and_no_work_is_left_marked() {
-    // The marks are concatenated here, so that this file does not find itself.
+    // The marks are concatenated from parts, so that the test does not find them in this file.
     let marks = [
         ["#[ign", "ore"].concat(),
         ["TO", "DO"].concat(),
@@ -243,7 +243,8 @@ fn no_test_is_ignored_and_no_work_is_left_marked() {
 
 #[test]
 fn files_of_users_are_written_through_one_room() {
-    // These files write into folders of their own or create a new file exclusively, except the record of benchmarks, which is appended to.
+    // The code in these files writes into separate folders, creates new files exclusively, or (for the record of benchmarks) appends to a
+    // file.
     let may = [
         "shared/failure/src/claim.rs",
         "shared/files/",

@@ -8,8 +8,8 @@ use std::process::{Command, Stdio};
 /// Names under which a browser may be installed.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
-/// Returns the elements of a page that reach beyond its width, each as `tag.class: right edge`. Elements inside an element of
-/// the class `scroll` do not count. `None` if there is no browser.
+/// Returns the elements of a page that extend beyond its width, each as `tag.class: right edge`. Elements inside an element of the class
+/// `scroll` are ignored. Returns `None` if there is no browser.
 ///
 /// * `folder`: folder for temporary files.
 /// * `width`: width of the page, in pixels.
@@ -29,7 +29,7 @@ pub fn too_wide(html: &str, folder: &Path, width: u32) -> io::Result<Option<Vec<
     let Some(browser) = BROWSERS.iter().find(installed) else {
         return Ok(None);
     };
-    // An iframe can have exactly the given width; windows have a minimum width.
+    // The page is shown in an iframe, which can have exactly the given width, because windows have a minimum width.
     let inside = html.replace('&', "&amp;").replace('"', "&quot;");
     let page = format!(
         "<!doctype html><meta charset=\"utf-8\"><title>not measured</title>\n\

@@ -21,7 +21,7 @@ pub struct Trial {
     pub rate_hz: f32,
     /// Unit of the positions, such as `mm`.
     pub units: String,
-    /// Names of the points; more than 255 are written to several parameters.
+    /// Names of the points. If there are more than 255, they are written to several parameters.
     pub labels: Vec<String>,
     /// Positions as `[frame][point]`, in the unit; `None` where the point was not visible.
     pub frames: Vec<Vec<Option<[f64; 3]>>>,

@@ -21,7 +21,7 @@ pub fn tagged(file: &[u8], value: u8) -> Vec<u8> {
         return [&file[..2], &segment, &file[2..]].concat();
     }
     assert!(file.starts_with(b"\x89PNG"), "neither JPEG nor PNG");
-    // After the signature and the chunk `IHDR`.
+    // The tag is inserted after the signature and the chunk `IHDR`.
     let (head, rest) = file.split_at(8 + 12 + 13);
     let chunk = [b"eXIf", &exif[..]].concat();
     let mut crc = flate2::Crc::new();

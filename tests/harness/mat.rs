@@ -8,7 +8,7 @@ use flate2::read::ZlibEncoder;
 /// A value to write.
 #[derive(Debug, Clone)]
 pub enum Mat {
-    /// Sizes, and the numbers with the first index fastest.
+    /// Sizes of the dimensions, and the numbers in column-major order (the first index changes fastest).
     Numbers(Vec<usize>, Vec<f64>),
     /// One row of structs: the names of the fields, and all values, element by element.
     Structs(Vec<&'static str>, Vec<Self>),
@@ -80,7 +80,7 @@ fn matrix(name: &str, value: &Mat) -> Vec<u8> {
             body.extend(values.iter().flat_map(|value| matrix("", value)));
         }
         Mat::Numbers(_, values) if values.iter().all(|&value| f64::from(value as u8) == value) => {
-            // MATLAB stores numbers in the narrowest type that holds them.
+            // MATLAB stores numbers in the narrowest type that can represent them.
             let bytes: Vec<u8> = values.iter().map(|&value| value as u8).collect();
             body.extend(element(2, &bytes));
         }

@@ -7,7 +7,7 @@ use std::path::Path;
 pub struct Array {
     /// Length of every axis.
     pub shape: Vec<usize>,
-    /// Numbers, with the last axis fastest.
+    /// Numbers in row-major order (the last index changes fastest).
     pub values: Vec<f64>,
 }
 

@@ -1,6 +1,6 @@
 //! Four real cameras around a balancing person: the effects of upright frames, of the facing direction, and of several candidates.
 //!
-//! Prints the table of errors against the markerless reference, and checks the figures reached so far.
+//! Prints a table of the errors relative to the markerless reference, and checks that they are not larger than the errors reached so far.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -113,9 +113,10 @@ fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached()
     let [.., mean, consensus, at_once] = &reached[..] else {
         panic!("three rows with everything switched on")
     };
-    // Values reached so far: 6.4 / 20.5 cm upright and 15.0 / 85.9 bent by the mean, 6.5 / 25.2 and 12.8 / 83.7 by consensus, 6.4 / 15.7
-    // and 11.0 / 95.4 with all views at once. The goals are 7 / 15 and 17 / 50. The large errors are due to crossed legs and raised wrists
-    // in the upright frames, and to sides and poses unlike the training data in the bent frames.
+    // Errors reached so far, in cm, for upright / bent frames: 6.4 and 20.5 / 15.0 and 85.9 by the mean, 6.5 and 25.2 / 12.8 and 83.7 by
+    // consensus, 6.4 and 15.7 / 11.0 and 95.4 with all views at once. The goals are 7 and 15 / 17 and 50. In the upright frames, large
+    // errors are caused by crossed legs and raised wrists. In the bent frames, they are caused by swapped sides, and by poses that differ
+    // from the training data.
     for ([upright, bent], [upright_cm, bent_cm]) in [
         (mean, [7.5, 16.0]),
         (consensus, [8.0, 14.0]),
@@ -141,7 +142,7 @@ pub(crate) fn rig() -> Rig {
     geometry::files::read(&file, &geometry::files::ReadOptions::default()).unwrap()
 }
 
-/// Returns the shipped detector that tells front from back.
+/// Returns the shipped detector that determines whether a person is seen from the front or from behind.
 fn orientation() -> Arc<Detector> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let bytes = std::fs::read(root.join("configs/models/person.orientation")).unwrap();
@@ -230,7 +231,7 @@ pub(crate) fn compare(
         };
         let single = got.answers[view].as_ref().unwrap();
         let single = estimator.plans()[view].centres(&single.candidates[0]);
-        // A view without a part in the frame is not on a wrong object.
+        // A view that does not contribute to the frame does not count as being on a wrong object.
         let fused = got.skeleton.views[view].as_ref();
         errors.wrong_single += usize::from(off(&single));
         errors.wrong_fused += usize::from(fused.is_some_and(|fused| off(&fused.pose.centres_px)));

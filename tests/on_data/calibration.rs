@@ -104,7 +104,7 @@ fn errors(camera: &Camera, truth: &[Point3<f64>; 21], seen: &Person) -> Vec<f64>
         .collect()
 }
 
-/// Returns, for each frame and camera, the person nearest to the reference, not the bystander.
+/// Returns, for each frame and camera, the detected person who is nearest to the reference, so that the bystander is left out.
 fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Person>> {
     let nearest = |frame: usize, camera: &Camera| {
         let people = detections(folder, &camera.name, frame).into_iter();
@@ -124,15 +124,15 @@ fn balancer(folder: &Path, rig: &Rig, truth: &[[Point3<f64>; 21]]) -> Vec<Vec<Pe
         .collect()
 }
 
-/// Result of triangulating the detections in all frames.
+/// The result of triangulating the detections in all frames.
 struct Fit {
-    /// Median of all reprojection errors, pixels at full size.
+    /// Median of all reprojection errors, in pixels of the full-size picture.
     residual_px: f64,
     /// Median reprojection error of each camera.
     by_camera_px: Vec<f64>,
     /// Median distance from the reference, in metres.
     distance: f64,
-    /// Number of joints that could be triangulated, and number of all other joints.
+    /// Number of joints that could be triangulated, and number of joints that could not.
     counts: [usize; 2],
 }
 
@@ -180,7 +180,7 @@ fn fit(folder: &Path, rig: &Rig) -> Fit {
     }
 }
 
-/// Returns the median distance between the projected reference and the detections, pixels at full size.
+/// Returns the median distance between the projected reference and the detections, in pixels of the full-size picture.
 fn reprojection(folder: &Path, rig: &Rig) -> f64 {
     let truth = reference(folder);
     let seen = balancer(folder, rig, &truth);

@@ -1,4 +1,4 @@
-//! Cameras with known clocks: the balancing keypoints, shifted and slowed down.
+//! Tests with known clocks of cameras: the keypoints of the balancing person are shifted in time and slowed down.
 
 use calibration::synchronisation::{Film, Joint, Person, Settings, Shot, estimate};
 use geometry::files::ReadOptions;
@@ -44,7 +44,7 @@ pub(crate) fn recorded(shared: &std::path::Path) -> (Vec<Film>, usize) {
     (films, n_joints)
 }
 
-/// Returns the film of a camera with another clock: it starts `first` frames later, and the distance between its frames is `pace` frames.
+/// Returns the film of a camera with another clock: it starts `first` frames later, and its frames are `pace` original frames apart.
 fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     let last = film.shots.len() - 1;
     let times = (0..).map(|nth| first + pace * f64::from(nth));
@@ -63,7 +63,7 @@ fn resampled(film: &Film, first: f64, pace: f64) -> Film {
     }
 }
 
-/// Interpolates a person between two frames; the nearest person in the next frame counts as the same.
+/// Interpolates a person between two frames; the nearest person in the next frame is assumed to be the same person.
 fn between(person: &Person, next: &[Person], share: f64) -> Option<Person> {
     if share < 1e-9 {
         return Some(person.clone());

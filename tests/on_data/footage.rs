@@ -53,7 +53,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
         let began = Instant::now();
         warp.apply(frame.rgb, &mut out);
         warped += began.elapsed();
-        // The room is bright, and no frame has a uniform colour.
+        // The room is bright, so the mean grey level is high. No frame has a uniform colour.
         assert!(
             (60.0..200.0).contains(&mean(&out)),
             "{path} {index}: {}",

@@ -1,8 +1,7 @@
-//! Alternating solutions of two real views. Bounds and threads do not change any result, and bounds save work.
-//!
-//! Prints a table: milliseconds per iteration, levels that remain after bounding, messages that are reused. The accuracy tests use the same
-//! pairs and settings. Every pair is solved under both assumptions about facing (the same or exchanged), as in a pipeline that decides
-//! between them.
+//! Alternating solutions of two real views. Tests that bounds and threads do not change any result, and that bounds save work. Prints a
+//! table of the milliseconds per iteration, the pyramid levels that remain after bounding, and the messages that are reused. The accuracy
+//! tests use the same pairs and settings. Every pair is solved under both assumptions about left and right in the two views (the same, or
+//! swapped), as in a pipeline that decides between them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -22,10 +21,10 @@ use crate::balancing::{clip, rig};
 use crate::multi_view::{humaneva, tables, umpm};
 use crate::shared_dir;
 
-/// Number of runs; the fastest one counts.
+/// Number of runs, of which the fastest is used.
 const RUNS: usize = 5;
 
-/// One view of one instant, with its single-view solution.
+/// One view at one time, with its single-view solution.
 struct Shot {
     plan: ViewPlan,
     responses: Vec<f32>,
@@ -78,7 +77,7 @@ impl Shot {
     }
 }
 
-/// One pair under one assumption about facing.
+/// One pair of views, under one assumption about left and right.
 struct Case<'a> {
     solver: &'a Solver,
     shots: [&'a Shot; 2],
@@ -161,7 +160,7 @@ fn describe(effort: &SolveStatistics) -> String {
     format!("{solved:.1} of {offered:.0} ({left:.0} %) | {reused:.0} %")
 }
 
-/// Checks and measures all pairs of some shots, starting from their joint start.
+/// Checks and measures all pairs of the given shots. Both views start from a common solution.
 fn measure(name: &str, solver: &Solver, shots: &[Shot], tables: Option<&TypeTables>) {
     let pool = |n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
     let pools = [1, 2].map(pool);
@@ -215,7 +214,7 @@ fn framed(camera: &Camera, source: [usize; 2], rgb: &[u8], size: [u32; 2]) -> (C
     (framing.camera().clone(), image)
 }
 
-/// Measures two stills at the size of the paper's pictures and at about 640 x 480.
+/// Measures two still pictures, at the size of the paper's pictures and at about 640 x 480.
 fn stills(
     name: &str,
     model: &Path,

@@ -1,4 +1,4 @@
-//! The released models, type tables and expected errors match their descriptions.
+//! Tests that the released models, type tables and expected errors match their descriptions.
 
 use std::fs;
 use std::path::PathBuf;

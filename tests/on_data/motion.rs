@@ -1,4 +1,4 @@
-//! Motion capture files of c3d.org and others: six encodings of one trial, and invalid files.
+//! Tests with motion capture files from c3d.org and other sources: six encodings of one trial, and invalid files.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn read(file: &Path) -> C3d {
     C3d::parse(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// * `step_mm`: step of the integers; reals may be more precise.
+/// * `step_mm`: resolution of the integer encodings. Floating-point encodings may be more precise.
 fn assert_same_points(dir: &Path, files: [&str; 6], step_mm: f64) {
     let trials = files.map(|file| read(&dir.join(file)));
     let first = &trials[0];
@@ -140,7 +140,7 @@ fn files_of_three_laboratories_are_converted_by_the_presets() {
         assert!(height.contains(&tall), "{file}: {tall}");
         assert!(noise < 0.1, "{file}: {noise}");
     }
-    // Markers are missing for more than a second. The error names the frames, and the frames before them can be read.
+    // Markers are missing for more than a second. The error message names these frames, and the frames before the gap can be read.
     let file = data.join("c3d/others/mocap36.c3d");
     let MotionError::Gap { frames, .. } = read_motion(&file, None, &options).unwrap_err() else {
         panic!("a gap")

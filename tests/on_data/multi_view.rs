@@ -1,4 +1,4 @@
-//! Pairs of views with the released energy, compared with runs of the authors' program.
+//! Solutions for pairs of views with the released energy function, compared with runs of the authors' program.
 
 #![expect(
     clippy::print_stdout,
@@ -126,8 +126,8 @@ fn epipolar_lines_agree_with_the_runs() {
     let l_r = run_file(&shared, "umpm_mv_L_R");
     let off = |shift| lines_off(&["l", "r"].map(|name| umpm(&shared, name, shift)), &l_r);
     println!("UMPM: {:.1e} px, {:.1e} px", off(0.0), off(-1.0));
-    // They assumed that the pixels of UMPM's principal point are counted from 0. UMPM's rotations have only six digits and are not exactly
-    // orthogonal; we orthogonalise them, but the runs did not.
+    // The runs assumed that the pixels of UMPM's principal point are counted from 0. UMPM's rotations have only six digits and are not
+    // exactly orthogonal; we orthogonalise them, but the runs did not.
     assert!(off(0.0) < 0.02 && off(-1.0) > 0.3);
 }
 
@@ -147,7 +147,7 @@ fn the_heat_map_of_a_line_agrees_with_the_program() {
     }
 }
 
-/// Two views of one instant, prepared for fusion.
+/// Two views at the same time, prepared for fusion.
 struct Pair {
     solver: Solver,
     plans: [ViewPlan; 2],

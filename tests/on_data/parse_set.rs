@@ -62,7 +62,7 @@ fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let pcp = |report: &Report| {
         [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent())
     };
-    // This value is recorded in the reference. The reference records PCK only for all 205 images: 73.1.
+    // This value is recorded in the reference. For PCK, the reference only has the value for all 205 images, which is 73.1.
     assert_eq!(
         pcp(&theirs).map(|value| (value * 10.0).round()),
         [713.0, 634.0]

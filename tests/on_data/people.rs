@@ -1,4 +1,4 @@
-//! Positions of cameras, calibrated from a person that they see: the balancing keypoints.
+//! Tests of camera poses that are calibrated from a person: the keypoints of the balancing person.
 
 use calibration::people::{Recording, Scale, Settings, Vertical, estimate};
 use calibration::synchronisation::{Film, Joint, Person, Shot};
@@ -13,7 +13,7 @@ use crate::{balancing, shared_dir};
 /// Number of frames in each sample.
 const DRAWN: usize = 42;
 const N_SAMPLES: u64 = 20;
-/// Height of the person from the bones, in the rig that is part of the recording, in metres.
+/// Height of the person in metres, computed from the bone lengths in the rig that is part of the recording.
 const HEIGHT_M: f64 = 1.652;
 
 /// Returns the joints in the order of a calibration, and for each joint the index of the same joint on the other side.

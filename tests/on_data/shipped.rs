@@ -44,7 +44,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
     let report = evaluate(found.iter().map(|(found, truth)| (Some(found), truth)));
     println!("{report}");
     let pcp = [PcpRule::MeanOfEnds, PcpRule::BothEnds].map(|rule| report.pcp(rule).percent());
-    // Other image decoders may change single limbs.
+    // With another image decoder, the result of a single limb may differ.
     for (got, card) in pcp.into_iter().zip(CARD) {
         assert!((got - card).abs() <= 0.5, "PCP {got}, the card says {card}");
     }
@@ -65,7 +65,7 @@ fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_bett
     };
     let people = training::datasets::read(&shared.join("data/parse"), &options).unwrap();
     let mut memory = LookMemory::default();
-    // For each person, the overlap of the first and the last box with the true box. These boxes are too large, or shifted.
+    // For each person, the overlaps of the first and the last box with the true box of the person. The first box is too large, or shifted.
     let mut shares = [Vec::new(), Vec::new()];
     for person in &people.people {
         let picture = Picture::read(&person.image).unwrap();

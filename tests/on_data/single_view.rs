@@ -32,8 +32,8 @@ impl Picture {
 
     /// Reads a JPEG file with libjpeg's arithmetic.
     ///
-    /// Decoders differ by one to three grey levels in a seventh of the samples. This is enough
-    /// to change orientation bins and the order of nearly equal detections.
+    /// Decoders differ by one to three grey levels in a seventh of the samples. Such differences can change orientation bins, and the order
+    /// of detections with nearly equal scores.
     pub(crate) fn read_as_libjpeg(path: &Path) -> Self {
         let mut image = mozjpeg::Decompress::new_path(path).unwrap().rgb().unwrap();
         Self {
@@ -235,8 +235,8 @@ fn the_distance_transform_equals_its_test_vector() {
     assert_eq!(off, 0.0);
 }
 
-/// Tolerance of scores: the authors' program uses plain sums in double precision. 8.7e-6 was measured, the
-/// same on every instruction set.
+/// Tolerance of scores: the authors' program uses plain sums in double precision. The measured difference is 8.7e-6 with every instruction
+/// set.
 const SCORES: f64 = 1e-5;
 
 /// Compares the optimised implementation with the output of the authors' program for a whole image.

@@ -1,4 +1,4 @@
-//! Responses computed in tiles, compared with plain sums over the same features.
+//! Compares responses that are computed in tiles with plain sums over the same features.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ fn differences(picture: &Picture, model: &Arc<Model>) -> [f64; 3] {
     [largest, (squares / f64::from(n)).sqrt(), score]
 }
 
-/// Scores must be within 1e-4 of plain sums. The measured difference is 1.1e-5, and 4.3e-5 for a response.
+/// Scores must differ by at most 1e-4 from plain sums. The largest measured difference is 1.1e-5 for scores, and 4.3e-5 for responses.
 #[test]
 fn tiles_change_no_pose_and_scores_by_rounding_only() {
     let Some(shared) = shared_dir() else { return };

@@ -38,13 +38,13 @@ const SQUARE_M: f64 = 3.6;
 const APART_M: f64 = 0.45;
 /// Distance from the middle line of a trunk within which the trunk hides joints behind it, in metres.
 const TRUNK_M: f64 = 0.15;
-/// Share of the joints that the detector misses.
+/// Fraction of the joints that the detector misses.
 const MISSED: f64 = 0.1;
-/// Number of instants in a clip.
+/// Number of frames in a clip.
 const N_INSTANTS: usize = 20;
-/// First instant that is evaluated.
+/// First frame that is evaluated.
 const FIRST: usize = 5;
-/// Time between two instants, in seconds.
+/// Time between two frames, in seconds.
 const STEP_S: f64 = 1.0 / 29.97;
 
 /// Joints of a person, in metres.
@@ -53,7 +53,7 @@ type Body = [Option<Point3<f64>>; N_JOINTS];
 /// Motion and cameras of the data set.
 struct Motion {
     cameras: Vec<Camera>,
-    /// Clips of all people in all stretches of the motion, instant by instant.
+    /// Clips of all people, from all sections of the motion, frame by frame.
     clips: Vec<Vec<Body>>,
 }
 
@@ -197,7 +197,7 @@ fn can_be_compared(a: &Detection, b: &Detection) -> bool {
     both.filter(|(a, b)| a.is_some() && b.is_some()).count() >= 4
 }
 
-/// Numbers of pairs of detections in two views: true pairs, found pairs, and pairs that are both.
+/// Numbers of pairs of detections in two views: true pairs, found pairs, and pairs that are both true and found.
 #[derive(Debug, Clone, Copy, Default)]
 struct Pairs {
     true_ones: usize,
@@ -264,8 +264,8 @@ struct Setting {
     noise_m: f64,
 }
 
-/// Follows people for twenty instants, with a new draw for every seed. Counts the pairs of each draw from the sixth instant on, after the
-/// people have received their identities.
+/// Follows randomly drawn people for twenty frames. Counts the pairs of every draw from the sixth frame on, when the people have received
+/// their identities.
 fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
     let draw = |seed: u64| {
         let mut random = Rng::with_seed(seed);

@@ -14,10 +14,10 @@ use crate::shared_dir;
 
 /// Number of consecutive frames of every camera that are searched.
 const N_FRAMES: usize = 60;
-/// Number of first frames that are also fused.
+/// Number of frames, from the first, that are also fused.
 const N_FUSED: usize = 12;
 
-/// Poses by view and frame, and the share of full searches.
+/// Poses by view and frame, and the fraction of frames that were searched in full.
 struct Searched {
     poses: Vec<Vec<Pose>>,
     full: f64,
@@ -71,8 +71,8 @@ fn tracking_is_nearly_as_accurate_as_a_full_search() {
         );
         reached.push((same, errors));
     }
-    // Values reached so far: 82.9 % of the poses are the same, and the median is 34.4 px, compared with 34.5 px (with left and right as in
-    // the single view).
+    // Values reached so far: 82.9 % of the poses are the same as with full searches. The median error is 34.4 px, compared with 34.5 px
+    // with full searches (left and right as in the single view).
     let (share, of_default) = reached[0];
     assert!(share > 0.75, "the same pose in {share} of the frames");
     assert!(of_default[0] <= 1.1 * median, "{} {median}", of_default[0]);
@@ -125,7 +125,7 @@ fn search(model: &Arc<Model>, clip: &Clip, track: Option<TrackSettings>) -> Sear
     }
 }
 
-/// Returns the share of frames in which all parts have the same position and type.
+/// Returns the fraction of frames in which all parts have the same position and type.
 fn same(a: &Searched, b: &Searched) -> f64 {
     let pairs = a.poses.iter().flatten().zip(b.poses.iter().flatten());
     let same = pairs.filter(|(a, b)| (a.level, &a.parts) == (b.level, &b.parts));
@@ -151,7 +151,7 @@ fn errors(model: &Model, clip: &Clip, truth: &[Vec<Point3<f64>>], got: &Searched
     [0.5, 0.9].map(|share| all.interpolated(share).unwrap())
 }
 
-/// Returns the median and the 90th percentile of the joints' errors in the world with all views fused, cm.
+/// Returns the median and the 90th percentile of the errors of the 3D joints, with all views fused, in cm.
 fn fused(
     model: &Arc<Model>,
     rig: &geometry::Rig,

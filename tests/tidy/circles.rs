@@ -1,13 +1,12 @@
-//! Finds circular dependencies between files of a crate: files that need one another, so that none can be understood first.
+//! Finds circular dependencies between files of a crate: files that depend on one another, so that none can be understood before the
+//! others.
 //!
-//! A file needs the files to which its `use` declarations and the paths in its code (`crate::`, `self::`, `super::`) lead.
-//! Re-exports are followed to the file that defines the name. Tests are left out: items after `#[cfg(test)]`, and the files of such
-//! modules.
+//! A file depends on the files to which its `use` declarations and the paths in its code (`crate::`, `self::`, `super::`) refer. Re-exports
+//! are followed to the file that defines the name. Tests are left out: items after `#[cfg(test)]`, and the files of such modules.
 //!
-//! A parent module and the modules below it count as one place, because the parent declares its children and these may use its
-//! items. Therefore circles through a parent and back from one of its children are not found, nor are circles through the root
-//! of the crate. Names behind `*` and names in macros are not found either. In a module within a file,
-//! `super` means that file.
+//! A parent module and the modules below it count as one place, because the parent declares its children and these may use its items.
+//! Therefore, the search does not find circles that lead from a parent to one of its children and back, or circles through the root of the
+//! crate. Names behind `*` and names in macros are not found either. In an inline module of a file, `super` means the file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -27,7 +26,7 @@ struct Import {
     is_public: bool,
 }
 
-/// Returns the circles among the files of a crate, each as the paths of its modules.
+/// Returns the circular dependencies among the files of a crate, each as a list of module paths.
 ///
 /// * `src`: the folder of the crate's root.
 /// * `files`: all files in this folder.
@@ -225,7 +224,7 @@ fn paths(text: &str) -> Vec<Vec<String>> {
     all
 }
 
-/// Returns the module to which a path leads, through re-exports.
+/// Returns the module to which a path refers, following re-exports.
 fn resolve(
     path: &[String],
     module: &Module,
@@ -240,7 +239,7 @@ fn resolve(
     }
     let mut current = Module::new();
     for mut name in absolute(path, module) {
-        // Names that are re-exported in a circle do not compile; the limit is for unfinished files.
+        // Names that are re-exported in a circle do not compile. The limit on the number of steps protects against unfinished files.
         for _ in 0..10 {
             let below: Module = current.iter().chain([&name]).cloned().collect();
             if sources.contains_key(&below) {
@@ -257,7 +256,7 @@ fn resolve(
     Some(current)
 }
 
-/// Returns sets of modules that reach one another.
+/// Returns the sets of modules that depend on one another.
 fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
     let reach = |from: &Module| {
         let mut reached: BTreeSet<&Module> = BTreeSet::new();
@@ -289,7 +288,7 @@ fn circles(needs: &BTreeMap<&Module, BTreeSet<&Module>>) -> Vec<Vec<String>> {
 mod tests {
     use super::*;
 
-    /// Returns the circles of a crate with these files.
+    /// Returns the circular dependencies of a crate with these files.
     fn circles_in(files: &[(&str, &str)]) -> Vec<Vec<String>> {
         let folder = tempfile::tempdir().unwrap();
         let write = |(name, text): &(&str, &str)| {

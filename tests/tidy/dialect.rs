@@ -1,10 +1,10 @@
-//! Counts the old dialect in the sources: closure arguments called `it`, functions called `of`, and documentation that begins with
-//! a question word instead of a name or a verb.
+//! Counts the places in the sources that have an outdated style: closure arguments called `it`, functions called `of`, and documentation
+//! that begins with a question word instead of a noun or a verb.
 
 use std::fs;
 use std::path::PathBuf;
 
-/// Returns the number of places in the old dialect.
+/// Returns the number of places with the outdated style.
 pub(crate) fn count(files: &[PathBuf]) -> usize {
     files
         .iter()

@@ -40,8 +40,8 @@ pub use host_fault::HostFault;
 pub use options::{Limits, Options};
 pub use scenario::Scenario;
 
-/// The hang limit of the `spin-...` scenarios with lossless delivery. A main loop reports progress every second, and three
-/// reports may be missing. With realtime delivery, the processor time of an iteration is limited instead.
+/// The hang limit of the `spin-...` scenarios with lossless delivery. A main loop reports progress every second, and the limit allows for
+/// three missing reports. With realtime delivery, the processor time of an iteration is limited instead.
 const SPIN_LIMIT: &str = "supervise.hang_limit_s=3";
 
 /// Outcome of the scenarios.
@@ -55,13 +55,13 @@ pub struct Outcome {
     pub table: String,
 }
 
-/// Runs the scenarios, checks their limits, and writes `chaos.json`. `None` if the trial was interrupted; then no file is
-/// written.
+/// Runs the scenarios, checks their limits, and writes `chaos.json`. Returns `None` if the trial was interrupted; no file is written in
+/// this case.
 ///
 /// # Errors
 ///
-/// Fails if the deployment cannot be read or used, if it lacks the process of a requested scenario, or if the report cannot be written.
-/// A run that fails is not an error but a missed limit.
+/// Fails if the deployment cannot be read or used, if it lacks the process of a requested scenario, or if the report cannot be written. A
+/// failed run is reported as a missed limit, not as an error.
 pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, Failure> {
     let testbed = Testbed::new(options, verbosity)?;
     let processes = testbed.plan("", &[])?;
@@ -90,7 +90,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     }))
 }
 
-/// Returns the requested scenarios; if none are requested, all scenarios that are possible with the processes of the deployment.
+/// Returns the requested scenarios. If none are requested, returns all scenarios that are possible with the processes of the deployment.
 fn chosen(requested: &[Scenario], processes: &[String]) -> Result<Vec<Scenario>, Failure> {
     if requested.is_empty() {
         let mut all = Scenario::all();

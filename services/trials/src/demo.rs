@@ -1,4 +1,4 @@
-//! The demo: a whole deployment with four synthetic cameras, one of which is killed, and a report.
+//! The demo: runs a whole deployment with four synthetic cameras, kills one of them, and writes a report.
 
 mod limits;
 mod machine;
@@ -64,10 +64,10 @@ impl Options {
     }
 }
 
-/// The files written at the end.
+/// The files that are written at the end.
 const REPORTS: [&str; 2] = ["report.json", "report.html"];
 
-/// The camera's process is killed after this share of the frames.
+/// Fraction of the frames after which the camera's process is killed.
 const KILL_AFTER: f64 = 0.4;
 
 /// Outcome of the demo.
@@ -81,7 +81,7 @@ pub struct Outcome {
     pub text: String,
 }
 
-/// Runs the demo, checks its limits, and writes its reports. `None` if the demo was interrupted; then no report is written.
+/// Runs the demo, checks its limits, and writes its reports. Returns `None` if the demo was interrupted; no report is written in this case.
 ///
 /// # Errors
 ///
@@ -138,7 +138,7 @@ pub fn run(options: &Options, verbosity: Verbosity) -> Result<Option<Outcome>, F
     conclude(options, &synthetic, (&run, &loaded.deployment.output)).map(Some)
 }
 
-/// Prepares the measurement of this machine's speed; `None` if the frame rate is given.
+/// Prepares the measurement of this machine's speed. Returns `None` if the frame rate is given, because no measurement is needed.
 fn gauge(options: &Options, folder: &Path, verbosity: Verbosity) -> Result<Option<Gauge>, Failure> {
     if options.rate_hz.is_some() {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! Learned consistency of several views: the file, and the tables made from it.
+//! The file of learned consistency between views, and the tables made from it.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|input: &[u8]| properties::consistency(input));

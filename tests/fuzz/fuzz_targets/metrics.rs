@@ -4,7 +4,7 @@
 use messages::{Metrics, MetricsRow, Span};
 use runtime::metrics::Reading;
 
-/// Any bytes in shared memory, read as numbers; zeros after the end.
+/// Arbitrary bytes in shared memory, read as numbers. After the end, all numbers are zero.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {

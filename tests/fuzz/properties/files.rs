@@ -26,7 +26,7 @@ fn with_checksum(magic: [u8; 8], payload: &[u8]) -> Vec<u8> {
 }
 /// Deployment files; the first line may be an option of the command line.
 ///
-/// Accepted text shows all its keys, is accepted again after it is written, and has processes that fit together.
+/// If a text is accepted, all its keys can be shown, it is accepted again after it is written, and its processes and topics are consistent.
 pub fn deployment_text(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -120,7 +120,7 @@ pub fn quality_network(input: &[u8]) {
     let _outcome = Network::parse(input.to_vec(), 2);
 }
 
-/// Part-type tables, and two joined tables.
+/// Part-type tables, each alone and joined with another table.
 pub fn type_table(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -134,7 +134,7 @@ pub fn type_table(input: &[u8]) {
     }
 }
 
-/// Learned consistency of several views: the file, and the tables made from it.
+/// The file of learned consistency between views, and the tables made from it.
 pub fn consistency(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -157,7 +157,8 @@ pub fn consistency(input: &[u8]) {
     }
 }
 
-/// Card of a network or of a detector. The numbers in an accepted card can be used, and its window shows a box.
+/// Card of a network or of a detector. If a card is accepted, its numbers can be used in computations, and its window contains the given
+/// box.
 pub fn network_card(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -189,7 +190,8 @@ pub fn network_card(input: &[u8]) {
     assert!(values.iter().all(|value| !value.is_nan()));
 }
 
-/// Keypoints from other programs, in both layouts. Accepted data has as many keypoints as names, within their limits.
+/// Keypoints from other programs, in both layouts. If data is accepted, it has as many keypoints as names, and their values are within the
+/// limits.
 pub fn keypoint_files(input: &[u8]) {
     let given = NameSet::of_set("mpii-16").expect("a set");
     let check = |people: &[SeenKeypoints], n: usize| {
@@ -221,7 +223,8 @@ pub fn keypoint_files(input: &[u8]) {
     }
 }
 
-/// Maps from the parts of a model to joints: the file, and the map to every joint set. If all parts are at one point, so are the joints.
+/// The file of a map from the parts of a model to joints, and the maps to every joint set made from it. If all parts are at one point, all
+/// joints are at this point.
 pub fn joint_file(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -263,7 +266,7 @@ pub fn calibration(input: &[u8]) {
 
 /// Tables of board corners, as other programs write them.
 ///
-/// An accepted table is the same after it is written and read again.
+/// If a table is accepted, it is unchanged after it is written and read again.
 pub fn board_corners(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;
@@ -382,7 +385,7 @@ fn written(trial: &Trial) {
     }
 }
 
-/// Lines of results as one person over time. Smoothed values are finite, however wrong the measurements are.
+/// Smooths lines of results as the motion of one person. Smoothed values are finite, however wrong the measurements are.
 fn smoothed(input: &str) {
     let mut recorded = Recorded::default();
     for line in runfiles::lines::<FrameLine>(input).flatten() {
@@ -430,7 +433,7 @@ fn smoothed(input: &str) {
     }
 }
 
-/// Files that a run leaves behind. Accepted data is written so that it reads back to the same text.
+/// Files that a run leaves behind. If data is accepted, writing it, reading it and writing it again gives the same text.
 pub fn run_files(input: &[u8]) {
     fn lines<L: Line>(input: &str) {
         for line in runfiles::lines::<L>(input).flatten() {

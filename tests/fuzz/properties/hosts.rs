@@ -11,7 +11,7 @@ const EXPECTED: Expected<'static> = Expected {
     max_body: 4096,
 };
 
-/// Any bytes from another host: they are accepted completely or refused.
+/// Arbitrary bytes from another host are either accepted completely or refused.
 pub fn host_messages(input: &[u8]) {
     if let Ok(packet) = Packet::parse(input, &EXPECTED) {
         assert_eq!(packet.to_bytes(), input);
@@ -39,7 +39,7 @@ pub fn host_messages(input: &[u8]) {
     clock_of(numbers);
 }
 
-/// Any numbers in a packet with a correct hash: the packet is refused, or read as it was sent.
+/// Arbitrary numbers in a packet with a correct hash: the packet is either refused, or read as it was sent.
 fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
     let contents = [Content::Frame, Content::ViewPose, Content::ViewQuality];
     let head = Head {
@@ -66,7 +66,7 @@ fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
     }
 }
 
-/// Estimates another host's clock from any times.
+/// Estimates another host's clock from arbitrary times.
 fn clock_of(mut it: Numbers<'_>) {
     let mut clock = Clock::default();
     for _ in 0..8 {
@@ -84,7 +84,7 @@ fn clock_of(mut it: Numbers<'_>) {
     }
 }
 
-/// The numbers in the input; zeros after the last.
+/// The numbers in the input. After the last one, all numbers are zero.
 #[derive(Clone, Copy)]
 struct Numbers<'a>(&'a [u8]);
 

@@ -1,5 +1,5 @@
-//! Properties of every decoder of messages. Each starts from valid messages, and the input describes changes in them.
-//! A change has ten bytes: field, entry, and value.
+//! Properties of every decoder of messages. Each property starts from valid messages, which it changes as the input describes. A change has
+//! ten bytes: field, entry, and value.
 
 use std::sync::{Arc, OnceLock};
 
@@ -184,7 +184,7 @@ fn change_pose(pose: &mut PoseMessage, field: u8, it: Change) {
     }
 }
 
-/// Every message that is copied, and frames. The data in an accepted message is at the stated positions.
+/// Decodes frames, and every message that is copied. In an accepted message, the data is at the stated positions.
 pub fn wire_messages(input: &[u8]) {
     frame(input);
     candidates(input);
@@ -393,8 +393,8 @@ fn result(input: &[u8]) {
     }
 }
 
-/// Evidence, candidates, expected errors and pairs of one frame, up to the skeleton. Accepted messages are used
-/// for the computation.
+/// Evidence, candidates, expected errors and pairs of one frame, processed up to the skeleton. Messages that are accepted must be usable in
+/// the computation.
 pub fn wire_fusion(input: &[u8]) {
     let World { model, plans, fuse } = world();
     let (input, pairs) = input.split_at(input.len() / 2);
@@ -438,7 +438,7 @@ pub fn wire_fusion(input: &[u8]) {
         let evidence = [&first.responses(), &second.responses()];
         let answer = fuse.pair([0, 1], &answers, evidence, &start);
         let sent = wire::pair_to_message([0, 1], answer.as_ref(), 3);
-        // Responses that are not finite can give an energy that is not finite; it is not sent.
+        // Responses that are not finite can give an energy that is not finite. Such a result is not sent.
         if let Some(read) = sent.ok().map(|sent| wire::pair_from_message(&sent, plans)) {
             found.extend(read.expect("it was written"));
         }
@@ -455,7 +455,7 @@ pub fn wire_fusion(input: &[u8]) {
     assert_eq!(message.people[0].n_views, 2);
 }
 
-/// Every part is a joint, because the joint sets of people have more parts than this chain.
+/// In these settings, every part is a joint, because the joint sets of people need more parts than this chain has.
 fn settings() -> SkeletonSettings {
     static PARTS: [skeleton::Joint; 3] = [
         skeleton::Joint {

@@ -1,5 +1,5 @@
-//! Properties of every reader and decoder, for any input. They are the bodies of all fuzz targets. A plain test also
-//! runs them over the seeds and their mutations.
+//! Properties that every reader and decoder must have for any input. They are the bodies of all fuzz targets. An ordinary test also checks
+//! them on the seeds and mutations of the seeds.
 
 mod files;
 mod hosts;

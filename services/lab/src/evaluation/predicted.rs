@@ -127,7 +127,8 @@ mod tests {
             (all.above, all.caught, all.wasted),
             (Some(50.0), Some(50.0), Some(50.0))
         );
-        // Of four pairs of samples, only one is in the wrong order: the expected error is 0.9 above the threshold, and 1.1 below it.
+        // Of four pairs of samples, only one is in the wrong order: the expected error is 0.9 where the true error is above the threshold,
+        // but 1.1 where it is below.
         assert_eq!(all.auc, Some(0.75));
         assert_eq!(judged[7].part, PART_NAMES[6]);
         assert_eq!(judged[7].auc, Some(0.75));

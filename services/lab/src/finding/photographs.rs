@@ -19,7 +19,7 @@ const SURE: f64 = 0.4;
 /// Overlap above which a box of the teacher shows a marked person: the shared area as a share of the union of both boxes. A box of the
 /// teacher that is mostly within a marked box also counts as the marked person's box.
 const SAME: f64 = 0.4;
-/// Largest coordinate of a joint, in pixels. In manual annotations, invisible joints can be at any position, even outside the picture.
+/// Distance by which a joint may be outside the picture, in pixels. In manual annotations, invisible joints can be anywhere.
 const ANYWHERE_PX: f64 = 1e5;
 
 /// A photograph, and the boxes of the marked people; `None` if it shows no people.

@@ -26,7 +26,7 @@ const MIN_TRUNK: f32 = 8.0;
 const MOST_ENLARGED: f64 = 4.0;
 /// Distance up to which two detections of the teacher count as the same keypoint, as a fraction of the window.
 const SAME: f32 = 0.05;
-/// Largest coordinate of a joint, in pixels. In manual annotations, invisible joints can be at any position, even outside the picture.
+/// Distance by which a joint may be outside the picture, in pixels. In manual annotations, invisible joints can be anywhere.
 const ANYWHERE_PX: f64 = 1e5;
 
 type Point = [f32; 2];

@@ -19,7 +19,7 @@ use super::provenance::Provenance;
 use super::report::Report;
 use crate::spread::Spread;
 
-/// Rounds before the measured rounds, in which kernels are compiled and memory is allocated.
+/// Number of rounds before the measured rounds, in which kernels are compiled and memory is allocated.
 const WARM_UP: usize = 3;
 
 /// Options of the benchmark of the GPU.
@@ -29,7 +29,7 @@ pub struct Gpu {
     pub sizes: Vec<[usize; 2]>,
     /// Numbers of views that are searched at the same time.
     pub views: Vec<usize>,
-    /// Frame rates, in hertz; 0 for as fast as possible.
+    /// Frame rates, in hertz; 0 means as fast as possible.
     pub rates_hz: Vec<f64>,
     /// Number of frames for each row of the table.
     pub frames: usize,
@@ -43,7 +43,7 @@ struct Row {
     size: [usize; 2],
     n_views: usize,
     rate_hz: f64,
-    /// Time from the picture to poses and evidence of all views, in milliseconds.
+    /// Time from the arrival of the pictures to the poses and evidence of all views, in milliseconds.
     spread: Option<Spread>,
 }
 

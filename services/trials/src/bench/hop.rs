@@ -46,13 +46,13 @@ pub(super) struct Measured {
     pub receiver: ReceiverReport,
     /// Number of messages whose location is known in both processes.
     pub n_compared: usize,
-    /// Number of compared messages with the same location in both processes.
+    /// Number of compared messages whose location is the same in both processes.
     pub n_same_place: usize,
     /// Bytes copied by the ports of both processes.
     pub copied_bytes: u64,
 }
 
-/// Sends a series. `None` if the benchmark was interrupted.
+/// Sends a series. Returns `None` if the benchmark was interrupted.
 pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, Failure> {
     let namespace = Namespace::new(&series.name)?;
     let limits = Limits::new(1, 1, 1);

@@ -16,11 +16,11 @@ use crate::trial::limit;
 /// Kind of load benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// All cameras in real time; then the same run with one camera killed.
+    /// A run with all cameras in real time, then the same run with one camera killed.
     Latency,
-    /// All cameras, with every frame processed as fast as possible.
+    /// A run with all cameras, in which every frame is processed as fast as possible.
     Throughput,
-    /// One camera, two cameras, and so on, in real time; then all cameras with one killed.
+    /// Runs in real time with one camera, two cameras, and so on; then a run with all cameras, one of which is killed.
     Scale,
 }
 
@@ -62,7 +62,7 @@ impl Kind {
     }
 }
 
-/// Measures a deployment under load. `None` if the benchmark was interrupted.
+/// Measures a deployment under load. Returns `None` if the benchmark was interrupted.
 ///
 /// # Errors
 ///

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 pub struct Options {
     /// The deployment file; if `None`, synthetic cameras are used.
     pub deployment: Option<PathBuf>,
-    /// Number of cameras, from the first in the deployment file; by default all. The default for synthetic cameras is 4.
+    /// Number of cameras to use, starting with the first in the deployment file. By default, all cameras are used, or four synthetic ones.
     pub views: Option<usize>,
     /// Length of the footage of every run, in seconds.
     pub seconds: u32,

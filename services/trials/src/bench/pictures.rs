@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use scene::{Scene, Settings, View};
 use terminal::output;
 
-/// Writes the first pictures of every camera into a subfolder named after it; false if the benchmark was interrupted.
+/// Writes the first pictures of every camera into a subfolder with the name of the camera. Returns false if the benchmark was interrupted.
 ///
 /// * `quiet`: true to show no progress.
 pub(super) fn draw(
@@ -49,7 +49,7 @@ pub(super) fn draw(
 
 /// Writes the pictures of a camera, and removes pictures of an earlier benchmark.
 ///
-/// * `is_enough`: called after every picture; true ends the rendering.
+/// * `is_enough`: called after every picture. Returns true to end the rendering.
 fn draw_view(
     view: &mut View,
     n_frames: u64,

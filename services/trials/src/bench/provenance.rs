@@ -18,8 +18,8 @@ pub(super) struct Provenance {
     pub load: String,
     /// Version of the program.
     pub version: &'static str,
-    /// Commit of the working tree of the executable, with `-dirty` if the tree has changes; `unknown` outside a
-    /// working tree.
+    /// Commit of the working tree that contains the executable, with `-dirty` if the tree has changes; `unknown` if the executable is not
+    /// in a working tree.
     pub commit: String,
 }
 

@@ -12,12 +12,12 @@ use terminal::output;
 
 use crate::spread::Spread;
 
-/// Number of messages before the measured messages.
+/// Number of messages that are sent before the measured messages.
 pub(super) const WARM_UP: u64 = 64;
-/// Number of first messages whose location is recorded.
+/// Number of messages, from the first, whose locations are recorded.
 pub(super) const N_PLACED: u64 = 32;
 
-/// Location of a message: file and offset. The same location in two processes means the same bytes.
+/// Location of a message: file and offset. If the location is the same in two processes, both access the same bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Spot {
     /// The number of the message.
@@ -115,7 +115,7 @@ pub(super) fn write(message: u64, payload: &mut [u8]) {
     }
 }
 
-/// Returns true if a payload is the content of a message; checks both ends and one byte in the middle.
+/// Returns true if a payload is the content of a message. Checks both ends and one byte in the middle.
 fn is_of(message: u64, payload: &[u8]) -> bool {
     let number = message.to_le_bytes();
     let is_whole = payload.len() < 24 || payload[payload.len() / 2] == message as u8;

@@ -59,7 +59,7 @@ impl Report {
             self.text()
         );
         let mut record = OpenOptions::new().create(true).append(true).open(file)?;
-        // The text is written at once, so that records of concurrent benchmarks do not mix.
+        // The text is written with a single call, so that records of concurrent benchmarks do not mix.
         record.write_all(text.as_bytes())
     }
 

@@ -22,11 +22,11 @@ pub struct Transport {
     pub messages: u64,
     /// Interval between messages, in microseconds.
     pub interval_us: u64,
-    /// Sizes of messages, bytes, at least 16; one series for each size.
+    /// Sizes of messages, in bytes, at least 16. There is one series for each size.
     pub bytes: Vec<usize>,
     /// True to measure the polling receiver only.
     pub spin: bool,
-    /// Cores of the sender and the receiver; any cores if empty.
+    /// Cores of the sender and the receiver. If empty, both may use any core.
     pub cores: Vec<usize>,
     /// Real-time priority of both processes, 1 to 99.
     pub priority: Option<u8>,

@@ -22,7 +22,7 @@ use crate::trial::synthetic::{self, Finder, N_CAMERAS, SyntheticDeployment, Synt
 
 /// Time that a stage waits for a late view of synthetic cameras, in milliseconds.
 const DEADLINE_MS: u64 = 500;
-/// Stages with computation, in pipeline order.
+/// Stages whose computing time is measured, in pipeline order.
 const STAGES: [&str; 5] = ["capture", "pose", "quality", "fuse", "triangulate"];
 /// Ticks per second in the kernel's counts of processor time (`USER_HZ`).
 const TICKS_HZ: f64 = 100.0;
@@ -75,7 +75,7 @@ impl Case {
 pub(super) struct Measured {
     /// The kind of run.
     pub case: Case,
-    /// Number of results; if a camera is killed, the number after the kill.
+    /// Number of results. If a camera is killed, only results after the kill are counted.
     pub n_results: usize,
     /// Results per second, from the first result to the last.
     pub rate_hz: Option<f64>,
@@ -134,7 +134,7 @@ pub(super) struct Workload {
 }
 
 impl Workload {
-    /// Reads the deployment, or writes one with synthetic cameras. `None` if the benchmark was interrupted.
+    /// Reads the deployment, or writes one with synthetic cameras. Returns `None` if the benchmark was interrupted.
     pub(super) fn new(
         options: &Options,
         verbosity: Verbosity,
@@ -172,7 +172,7 @@ impl Workload {
         self.n_views
     }
 
-    /// Writes a deployment with synthetic cameras, and their pictures; false if the benchmark was interrupted.
+    /// Writes a deployment with synthetic cameras, and the pictures of the cameras. Returns false if the benchmark was interrupted.
     fn write_synthetic(&mut self, options: &Options, stop: &Stop) -> Result<bool, Failure> {
         let n_frames = (options.rate_hz * f64::from(options.seconds)).round() as u64;
         let setup = SyntheticSetup {
@@ -204,7 +204,7 @@ impl Workload {
         Ok(is_done)
     }
 
-    /// Limits the footage to some seconds; fails if more cameras are requested than exist.
+    /// Limits the duration of the footage. Fails if more cameras are requested than exist.
     fn shorten(&mut self, options: &Options) -> Result<(), Failure> {
         let deployment = load::read(&self.file, &self.set)?.deployment;
         let n_cameras = deployment.cameras.len();
@@ -243,7 +243,7 @@ impl Workload {
         Ok(deployment)
     }
 
-    /// Runs the deployment and measures it. `None` if the benchmark was interrupted.
+    /// Runs the deployment and measures it. Returns `None` if the benchmark was interrupted.
     pub(super) fn measure(&self, case: Case, stop: &Stop) -> Result<Option<Measured>, Failure> {
         let deployment = self.deployment(case)?;
         let planned = Planned::new(&deployment, self.verbosity.level)?;

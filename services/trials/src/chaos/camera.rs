@@ -15,9 +15,9 @@ use super::verdict::{Verdict, ms};
 use crate::trial::limit::{at_least, at_most};
 use crate::trial::results::FrameResult;
 
-/// Duration of the fault, as a share of the footage.
+/// Duration of the fault, as a fraction of the footage's duration.
 const SHARE: f64 = 0.2;
-/// Number of repetitions after which a picture counts as frozen. It is small, so that a short run shows the fault.
+/// Number of repetitions after which a picture counts as frozen. It is small, so that the fault is detected in a short run.
 const FROZEN_AFTER: &str = "capture.frozen_after=2";
 
 /// Measurements of a run with a camera fault. Times are in milliseconds.
@@ -27,7 +27,7 @@ pub(super) struct CameraFailure {
     pub camera: String,
     /// First frame of the fault, and first frame after it.
     pub span: [u64; 2],
-    /// For each cause, the number of results of frames in `span` that name the cause as the reason for the missing view.
+    /// For each cause, the number of results of frames in `span` that state this cause for the missing view.
     pub flagged: Vec<(String, usize)>,
     /// Number of results of frames in `span` that use other views.
     pub results_without_it: usize,

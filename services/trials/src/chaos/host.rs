@@ -18,7 +18,8 @@ use crate::trial::limit::{at_most, none_of};
 
 /// Duration of the fault.
 const FAULT: Duration = Duration::from_secs(3);
-/// Longest time until the other host counts as gone, in milliseconds. A host is gone after a silence of 1.2 s, and the machine may be busy.
+/// Longest time until the other host is reported as not answering, in milliseconds. It is reported after 1.2 s without a message, or later
+/// if the machine is busy.
 const MAX_NOTICED_MS: f64 = 4000.0;
 /// Longest time to wait for the other host at the start.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -109,11 +110,11 @@ fn verdict(name: &str, options: &Options, measured: Measured) -> Verdict {
     }
 }
 
-/// The run of a host; it ends when this value is dropped.
+/// The run of a host, which ends when this value is dropped.
 struct Running(Child);
 
 impl Running {
-    /// Kills the run; its processes end with it.
+    /// Kills the run. The processes of the run end with it.
     fn end(&mut self) {
         let ended = self.0.kill().and_then(|()| self.0.wait());
         if let Err(error) = ended {
@@ -139,7 +140,7 @@ impl Watch<'_> {
         serde_json::from_str(&std::fs::read_to_string(&self.state).ok()?).ok()
     }
 
-    /// Waits until the state of the hosts satisfies `is_so`; `None` if this takes longer than `limit`.
+    /// Waits until the state of the hosts satisfies `is_so`. Returns `None` if this takes longer than `limit`.
     fn until(&self, limit: Duration, is_so: impl Fn(&Value) -> bool) -> Option<Value> {
         let begin = Instant::now();
         while begin.elapsed() < limit && !self.testbed.stop.is_requested() {
@@ -161,7 +162,7 @@ fn views(state: &Value) -> impl Iterator<Item = &Value> {
     hosts.flat_map(|host| host["views"].as_array().into_iter().flatten())
 }
 
-/// Returns the number of used frames of the other host, for the view with the fewest.
+/// Returns the lowest number of used frames of any view of the other host.
 fn n_used(state: &Value) -> u64 {
     let used = views(state).filter_map(|view| view["used"].as_u64());
     used.min().unwrap_or(0)
@@ -187,7 +188,7 @@ fn free_port() -> std::io::Result<u16> {
     Ok(TcpListener::bind(("127.0.0.1", 0))?.local_addr()?.port())
 }
 
-/// Writes the deployment with its hosts, for one of the hosts. The first half of the cameras is connected to the fusing host.
+/// Writes the deployment file of one of the hosts. The first half of the cameras is connected to the fusing host.
 fn write(testbed: &Testbed, host: &str, port: u16) -> Result<PathBuf, Failure> {
     let text = std::fs::read_to_string(&testbed.file)
         .map_err(|error| failure::in_file(&testbed.file, &error))?;

@@ -12,17 +12,17 @@ use crate::trial::limit::{at_least, at_most, none_of};
 
 /// Longest time until a death is noticed, in milliseconds.
 const NOTICE_MS: f64 = 1000.0;
-/// Longest time from the hang limit until a hang is noticed, in milliseconds.
+/// Longest time by which a hang may be noticed after the hang limit, in milliseconds.
 const LATE_MS: f64 = 1000.0;
-/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
-/// not count.
+/// Number of frames per kill that may be unaccounted for: the frame that the process was processing, and a frame that its last health
+/// message did not yet count.
 const MAX_UNACCOUNTED: u64 = 2;
-/// Factor by which a resource may grow. A fixed amount is added.
+/// Factor by which the use of a resource may grow during a run. A fixed amount may be added to it.
 const GROWTH: f64 = 1.1;
 const MORE_BYTES: f64 = 32e6;
 const MORE_FILES: f64 = 8.0;
 
-/// Part of a run's outcome that is the same for all scenarios.
+/// The part of a run's outcome that all scenarios have in common.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RunOutcome {
     /// Reason why the run failed; `None` if it did not fail.
@@ -40,7 +40,7 @@ pub(super) struct RunOutcome {
 }
 
 impl RunOutcome {
-    /// Checks the limits that are the same for all scenarios.
+    /// Checks the limits that all scenarios have in common.
     ///
     /// * `n_kills`: the number of processes that were killed or made to hang.
     pub(super) fn judge(&self, n_kills: u64) -> Vec<Limit> {
@@ -79,7 +79,7 @@ pub(super) fn once(
     let back = requested.max_return_ms + patience;
     let pause = match service_of(process) {
         "capture" | "pose" | "quality" => requested.max_pause_ms,
-        // Without the other processes, some or all results are missing.
+        // While another process is missing, some or all results are missing.
         _ => back,
     };
     let mut limits = vec![
@@ -226,7 +226,7 @@ mod tests {
         missed.map(|missed| missed.what).collect()
     }
 
-    /// Returns the limits that a good run misses after a change.
+    /// Returns the limits that a good run misses if `change` is applied to its measurements.
     fn missed_once(
         fault: ProcessFault,
         process: &str,
@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(missed_once(ProcessFault::Kill, "capture-1", pause).len(), 1);
     }
 
-    /// Returns the limits that a good run with random kills misses after a change.
+    /// Returns the limits that a good run with random kills misses if a change is applied to its measurements.
     fn missed_random(
         change: impl FnOnce(&mut RandomKillsOutcome, &mut ResourceUse),
     ) -> Vec<String> {

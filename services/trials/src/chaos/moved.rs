@@ -1,4 +1,4 @@
-//! The scenario `camera-moved`: a camera was moved after the calibration, and must be identified.
+//! The scenario `camera-moved`: a camera was moved after the calibration, and the run must identify it.
 
 use std::path::PathBuf;
 

@@ -15,7 +15,7 @@ pub struct Options {
     pub seed: u64,
     /// Length of the footage of every run, in seconds.
     pub seconds: u32,
-    /// Length of the parts in the report of a run with random kills, in seconds.
+    /// Length of the parts into which the report of a run with random kills is divided, in seconds.
     pub part_seconds: u32,
     /// Folder for the report and the results.
     pub out: PathBuf,
@@ -28,9 +28,9 @@ pub struct Options {
 /// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For a process that results do not
-    /// name, the time until it reports that it has worked.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For a process that does not appear in
+    /// results, it is the time until the process reports that it has worked.
     pub max_return_ms: f64,
-    /// Longest pause between results while a process is missing, if other processes do not depend on it, in milliseconds.
+    /// Longest pause between results, in milliseconds, while a process on which no other process depends is missing.
     pub max_pause_ms: f64,
 }

@@ -48,7 +48,7 @@ pub(super) fn kill(
     let mut supervisor = command.spawn().or_fail(ExitKind::Run)?;
     let outcome = wait_for_results(testbed, &mut supervisor, &results);
     let orphans = children(supervisor.id());
-    // This also happens after a failure, so that the process does not keep running.
+    // The supervisor is killed even after a failure, so that it does not keep running.
     supervisor.kill().or_fail(ExitKind::Run)?;
     let killed = Instant::now();
     supervisor.wait().or_fail(ExitKind::Run)?;

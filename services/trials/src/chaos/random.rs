@@ -14,7 +14,7 @@ use super::testbed::Testbed;
 use super::verdict::{self, Verdict};
 use crate::spread::Spread;
 
-/// Share of the frames after which no process is killed.
+/// Fraction of the frames after which no more processes are killed.
 const UNTIL: f64 = 0.8;
 /// Time between two kills, in nanoseconds.
 const PERIOD: u64 = 2_000_000_000;

@@ -18,7 +18,7 @@ pub(super) struct RandomKills {
     period: u64,
     /// Frame whose result ends the kills.
     until_frame: u64,
-    /// Time of the next kill; `None` before the first result.
+    /// Time of the next kill; `None` before the first result of the run.
     next_at: Option<u64>,
     is_over: bool,
     /// Process id and epoch of the running processes, by name.
@@ -39,7 +39,7 @@ pub(super) struct Kill {
 
 impl Kill {
     /// Returns the downtime, in milliseconds. It ends when the process sends its first message that contributes to a result. For a process
-    /// that results do not name, the downtime ends when the process reports that it has worked.
+    /// that does not appear in results, the downtime ends when the process reports that it has worked.
     ///
     /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(super) fn downtime_ms(
@@ -120,7 +120,7 @@ impl RandomKills {
         self.kill_if_due(now, kill)
     }
 
-    /// Returns the kill of a process that is not back yet.
+    /// Returns the kill of a process that does not work again yet.
     fn pending(&mut self, process: &str) -> Option<&mut Kill> {
         let mut kills = self.kills.iter_mut();
         kills.find(|kill| kill.process == process && kill.times.recovered.is_none())
@@ -168,7 +168,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Passes an event at a time, and returns the id of the process that was killed.
+    /// Handles an event at the given time, and returns the id of the process that was killed.
     fn handle_at(random_kills: &mut RandomKills, event: &Event<'_>, ms: u64) -> Option<u32> {
         let mut killed = None;
         random_kills.handle(event, ms * MS, |pid| {
@@ -221,7 +221,7 @@ mod tests {
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2099), None);
         let first = health_at(&mut random_kills, "pose-0", 0, 1, 2100).unwrap();
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2200), None);
-        // The other process is killed, because the first process is not back.
+        // The other process is killed, because the first process has not been restarted yet.
         let second = handle_at(
             &mut random_kills,
             &Event::Line {
@@ -250,7 +250,7 @@ mod tests {
             150,
         );
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2100), Some(71));
-        // A health message from before the kill.
+        // This health message is from before the kill.
         health_at(&mut random_kills, "pose-0", 0, 1, 2101);
         let died = Event::Died {
             process: "pose-0",

@@ -40,7 +40,7 @@ impl Relay {
         self.port
     }
 
-    /// Unplugs or plugs in the cable. While it is unplugged, no data passes, and neither side is notified, as with a real cable.
+    /// Unplugs or plugs in the simulated cable. While it is unplugged, no data passes and neither side is notified, as with a real cable.
     pub(super) fn cut(&self, is_cut: bool) {
         self.is_cut.store(is_cut, Ordering::Relaxed);
     }
@@ -61,7 +61,7 @@ fn accept(listener: &TcpListener, port: u16, flags: &Flags) {
             continue;
         };
         let address = SocketAddr::from(([127, 0, 0, 1], port));
-        // If nothing listens on the port, the connection is closed, as without the relay.
+        // If nothing listens on the port, the connection is closed, just as it would be without the relay.
         if let Ok(far) = TcpStream::connect_timeout(&address, Duration::from_secs(1))
             && let Err(error) = join(&near, &far, flags)
         {

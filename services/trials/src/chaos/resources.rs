@@ -1,7 +1,7 @@
 //! Measures the resources of a run every second: memory, descriptors and files.
 //!
-//! The buffers of a process grow to the size that its largest frame needed, so an old process uses more memory than a new one.
-//! Therefore the resources at the start and at the end of a run are compared at equal ages of its processes.
+//! The buffers of a process grow to the size that its largest frame needed, so a process uses more memory the longer it runs. Therefore,
+//! resources at the start and at the end of a run are compared between processes of the same age.
 
 use core::ops::Range;
 use std::collections::BTreeMap;
@@ -130,7 +130,7 @@ impl ResourceMonitor {
     }
 
     /// Returns the resources at the start and at the end: the medians over the first and the last third of the samples. The memory of
-    /// processes is compared at equal ages. `None` if there are too few samples.
+    /// processes is compared at equal ages. Returns `None` if there are too few samples.
     pub(super) fn ends(&self) -> Option<[ResourceUse; 2]> {
         let third = self.samples.len() / 3;
         if self.samples.len() < MIN_SAMPLES {
@@ -158,7 +158,8 @@ impl ResourceMonitor {
     }
 }
 
-/// Returns the class of an age: the logarithm of the age in seconds. Ages in one class differ by less than a factor of two.
+/// Returns the class of an age: the binary logarithm of the age in seconds, rounded down. Ages in one class differ by less than a factor of
+/// two.
 fn age_class(nanos: u64) -> u32 {
     (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }
@@ -349,11 +350,11 @@ mod tests {
 
     #[test]
     fn memory_is_compared_at_equal_ages() {
-        // The process is killed often at first and grows old at the end; its memory depends on its age alone.
+        // The process is killed often at first, but not at the end. Its memory depends only on its age.
         let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, memory)| sample(age, memory));
         let old = [(5, 60), (20, 120), (100, 180)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &old]), [60, 60]);
-        // Each new process uses more memory because of data that earlier processes left behind.
+        // Every restarted process uses more memory than the one before, because of data that earlier processes left behind.
         let leaking = [(1, 90), (2, 95), (5, 100)].map(|(age, memory)| sample(age, memory));
         assert_eq!(at_equal_ages([&young, &leaking]), [55, 95]);
         let older = [(50, 90)].map(|(age, memory)| sample(age, memory));

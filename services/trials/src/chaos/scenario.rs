@@ -107,7 +107,7 @@ impl Scenario {
                 processes.iter().any(|process| service_of(process) == service)
             }
             Self::Random | Self::Supervisor | Self::Camera(_) | Self::Stall => true,
-            // Each host needs two cameras, and not every build supports links between hosts.
+            // Each of the two hosts needs two cameras, and the build must support links between hosts.
             Self::Host(_) => {
                 bridge::HAS_LINK
                     && processes.iter().filter(|process| service_of(process) == "capture").count()

@@ -1,4 +1,4 @@
-//! Report of a long run in parts: latency, kills and resources in each part.
+//! Divides the report of a long run into parts, with the latency, kills and resources of each part.
 
 use core::ops::Range;
 
@@ -10,10 +10,10 @@ use super::resources::{ResourceMonitor, ResourceUse};
 use crate::spread::Spread;
 use crate::trial::results::FrameResult;
 
-/// Numbers of a part of a run.
+/// The measurements of one part of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Part {
-    /// Start of the part, seconds since the planning of the run.
+    /// Start of the part, in seconds since the planning of the run.
     pub from_s: f64,
     /// Number of kills.
     pub kills: usize,
@@ -21,7 +21,7 @@ pub(super) struct Part {
     pub results: usize,
     /// Time from the capture of the first picture to the result, in milliseconds.
     pub end_to_end_ms: Option<Spread>,
-    /// Median resources; `None` if there was no second in which all processes worked.
+    /// Medians of the resources; `None` if there was no second in which all processes worked.
     #[serde(rename = "held")]
     pub resources: Option<ResourceUse>,
 }
@@ -56,7 +56,7 @@ pub(super) fn parts(
     begins.map(part).collect()
 }
 
-/// Returns the parts as a table with a header and one line per part; empty for a single part.
+/// Returns the parts as a table with a header and one line per part. Returns an empty list for a single part.
 pub(super) fn table(parts: &[Part]) -> Vec<String> {
     if parts.len() < 2 {
         return Vec::new();

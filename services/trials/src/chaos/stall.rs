@@ -20,20 +20,20 @@ use crate::trial::limit::{at_least, at_most};
 const STALL_NANOS: u64 = 3_000_000_000;
 /// Settings with which the supervisor does not treat the stopped process as hung.
 const NO_HANG_DETECTION: [&str; 2] = ["supervise.missed_beats=1000", "supervise.hang_limit_s=600"];
-/// With realtime delivery, the smallest rate of results during the stop, as a share of the rate before it.
+/// With realtime delivery, the smallest rate of results during the stop, as a fraction of the rate before the stop.
 const SHARE: f64 = 0.5;
 
 /// Stops and resumes the process `results`, and measures the rate of results.
 #[derive(Debug, Default)]
 pub(super) struct StallInjector {
-    /// Frame after whose result the process is stopped.
+    /// Number of the frame after whose result the process is stopped.
     at_frame: u64,
     pid: Option<u32>,
-    /// Time, nanoseconds, and number of results at the first health message with a result.
+    /// Time in nanoseconds, and number of results, at the first health message that reports a result.
     first: Option<[u64; 2]>,
-    /// Time, nanoseconds, and number of results when the process was stopped.
+    /// Time in nanoseconds, and number of results, when the process was stopped.
     stopped: Option<[u64; 2]>,
-    /// Time, nanoseconds, and number of results when the process was resumed.
+    /// Time in nanoseconds, and number of results, when the process was resumed.
     resumed: Option<[u64; 2]>,
 }
 
@@ -198,7 +198,8 @@ mod tests {
 
     const SECOND: u64 = 1_000_000_000;
 
-    /// Passes a health message with a number of results at a time. Returns true if the process was stopped, false if it was resumed.
+    /// Handles a health message with a number of results at the given time. Returns true if the process was stopped, false if it was
+    /// resumed.
     fn health_at(stall: &mut StallInjector, n_sent: u64, at: u64) -> Option<bool> {
         let health = Health {
             n_sent,

@@ -1,20 +1,20 @@
-//! Time of the fault, and the part of a result that has the epoch of a process.
+//! The time at which a fault is injected, and the part of a result that contains the epoch of a process.
 
 use launch::Planned;
 
 use crate::trial::cost::EpochSource;
 
-/// Share of the frames after which the fault is injected.
+/// Fraction of the frames after which the fault is injected.
 pub(super) const INJECT_AFTER: f64 = 0.4;
 
-/// Returns the number of the frame at a share of all frames.
+/// Returns the number of the frame at a given fraction of all frames.
 pub(super) fn frame_at(planned: &Planned, share: f64) -> f64 {
     let capture = &planned.resolved().deployment.capture;
     let nth = share * planned.resolved().n_frames() as f64;
     capture.start_frame as f64 + nth.floor() * capture.frame_step as f64
 }
 
-/// Returns the part of a result that has the epoch of a process.
+/// Returns the part of a result that contains the epoch of a process.
 pub(super) fn epoch_source_of(process: &str) -> EpochSource {
     let view = |text: &str| process.strip_prefix(text)?.parse().ok();
     match (view("capture-"), view("pose-"), process) {

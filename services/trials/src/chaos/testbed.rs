@@ -92,7 +92,7 @@ impl Testbed {
         SyntheticDeployment::new(&setup, self.folder.clone())?.write(&setup)
     }
 
-    /// Limits the footage to some seconds, and returns the name of the deployment.
+    /// Limits the duration of the footage, and returns the name of the deployment.
     fn shorten(&mut self, seconds: u32) -> Result<String, Failure> {
         let planned = self.plan("", &[])?;
         let resolved = planned.resolved();

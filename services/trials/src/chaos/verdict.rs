@@ -44,7 +44,7 @@ impl Verdict {
     }
 }
 
-/// Returns the verdicts as a table, with the missed limits of each.
+/// Returns the verdicts as a table, with the missed limits of each scenario.
 pub(super) fn table(verdicts: &[Verdict]) -> String {
     let mut text = String::new();
     // Writing to a string cannot fail.

@@ -8,24 +8,24 @@ use super::score::Score;
 use crate::trial::cost::Cost;
 use crate::trial::limit::{at_least, at_most, none_of};
 
-/// Number of frames per kill that may be unaccounted for: the frame that the process held, and a frame that its last health message did
-/// not count.
+/// Number of frames per kill that may be unaccounted for: the frame that the process was processing, and a frame that its last health
+/// message did not yet count.
 const MAX_UNACCOUNTED: u64 = 2;
 
 /// The measurements of a run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Measured<'a> {
-    /// Number of frames that the cameras should capture.
+    /// Number of frames that each camera should capture.
     pub n_frames: u64,
     /// Number of results, and number of results with a skeleton.
     pub n_results: [usize; 2],
     /// Accuracy of the results.
     pub score: &'a Score,
-    /// Cost of the kill; `None` if no kill was planned.
+    /// Effects of the kill; `None` if no kill was planned.
     pub cost: Option<&'a Cost>,
     /// Time that a stage waits for a late view, in milliseconds.
     pub deadline_ms: f64,
-    /// Computing time relative to a machine that keeps up with 5 frames per second, at least 1.
+    /// Computing time relative to a machine that can process 5 frames per second, at least 1.
     pub slowness: f64,
     /// Interval between frames relative to the interval at 5 frames per second, at least 1.
     pub spread: f64,
@@ -103,8 +103,8 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     limits
 }
 
-/// Returns true if the camera was missing for so long that there must be results of the other views in the meantime. This is the case if it
-/// was missing for longer than the usual pauses between results and the deadline for a late view.
+/// Returns true if the camera was missing for so long that the other views must have produced results in the meantime. This is the case if
+/// it was missing for longer than the usual pause between results plus the deadline for a late view.
 fn needs_results_meanwhile(cost: &Cost, deadline_ms: f64) -> bool {
     let away = cost.back_ms.unwrap_or(f64::INFINITY);
     away > 2.0 * cost.usual_pause_ms.unwrap_or(0.0) + deadline_ms
@@ -211,7 +211,7 @@ mod tests {
         }
     }
 
-    /// Returns the limits that a good run misses after a change.
+    /// Returns the limits that a good run misses if `change` is applied to its measurements.
     fn missed(change: impl FnOnce(&mut Run)) -> Vec<String> {
         let limits = Run::changed(change).limits().into_iter();
         limits.filter(|limit| !limit.held).map(|limit| limit.what).collect()

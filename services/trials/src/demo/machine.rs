@@ -19,18 +19,18 @@ pub(super) const FULL_RATE_HZ: f64 = 5.0;
 /// Lowest frame rate, frames per second.
 const MIN_RATE_HZ: f64 = 0.25;
 
-/// Share of the interval between two frames that computing may use. The rest is for the overhead of processes and
-/// for changes of the load.
+/// Fraction of the interval between two frames that computing may use. The rest is left for the overhead of processes and for changes of
+/// the load.
 const SHARE: f64 = 0.5;
 
-/// Number of times that the network is applied, instead of once, if the person's last frame is long ago: to three boxes, and to a closer
-/// box.
+/// Number of times that the network is applied to a frame if the person was last seen long ago: to three boxes, and then to a box that fits
+/// more closely. Otherwise, it is applied once.
 const LOOKS: f64 = 4.0;
 
 /// Duration of a measurement.
 const SPAN: Duration = Duration::from_secs(2);
 
-/// Smallest number of measured frames; in these frames, every camera searches for the person once.
+/// Smallest number of measured frames. It is so large that every camera searches for the person once.
 const LEAST_FRAMES: u64 = 10;
 
 /// Renders frames of all cameras and finds the person in them, like the processes of the run.
@@ -73,7 +73,7 @@ impl Gauge {
         })
     }
 
-    /// Measures for about two seconds.
+    /// Measures the speed of this machine for about two seconds.
     pub(super) fn measure(&mut self) -> Result<Machine, Failure> {
         let load = load();
         // After a warm-up, the person is searched for again.
@@ -124,15 +124,16 @@ pub(super) struct Machine {
     load: Option<f64>,
     n_cores: usize,
     n_cameras: usize,
-    /// Time for one frame of all cameras on all cores in which the person is searched for in the whole picture, in seconds.
+    /// Time for a frame in which the person is searched for in the whole pictures of all cameras, on all cores, in seconds.
     search_s: f64,
     /// Mean time for one frame in which the person is followed from the previous frame, in seconds.
     followed_s: f64,
 }
 
 impl Machine {
-    /// Returns the mean time for one frame of all cameras on all cores, in seconds. If the machine is too slow to follow the person from
-    /// box to box, the network is applied to more boxes: to boxes around the last box, and to a closer box.
+    /// Returns the mean time for one frame of all cameras on all cores, in seconds. On a machine that is too slow to follow the person from
+    /// frame to frame, the network is applied to more boxes in each frame: to boxes around the last one, and to a box that fits more
+    /// closely.
     fn frame_s(&self) -> f64 {
         if self.followed_s <= SHARE * FOLLOWED_S {
             self.followed_s
@@ -141,7 +142,8 @@ impl Machine {
         }
     }
 
-    /// Returns the frame rate of the cameras: at most `FULL_RATE_HZ`, and so low that computing takes at most `SHARE` of the time.
+    /// Returns the frame rate of the cameras. It is at most `FULL_RATE_HZ`, and so low that computing takes at most the fraction `SHARE` of
+    /// the time.
     pub(super) fn rate_hz(&self) -> f64 {
         let most = SHARE / self.frame_s();
         // Rounded to two decimals, for display.
@@ -234,7 +236,7 @@ mod tests {
             (0.02, 5.0, 1.0),
             (0.1, 5.0, 1.0),
             (0.2, 2.5, 2.0),
-            // At this rate, the person can no longer be followed.
+            // At this rate, the person can no longer be followed from frame to frame.
             (0.3, 0.55, 9.0),
             (0.5, 0.33, 15.0),
             (4.0, 0.25, 120.0),

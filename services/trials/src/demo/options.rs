@@ -9,11 +9,12 @@ use scene::Action;
 pub struct Options {
     /// The folder for the report and the run.
     pub out: PathBuf,
-    /// Frames per camera. The default is the number in `seconds`, or otherwise in twenty seconds, but at least 30.
+    /// Number of frames per camera. By default, it is the number of frames in `seconds` or, if that is not given, in twenty seconds, but at
+    /// least 30.
     pub frames: Option<u64>,
     /// Duration of the run, in seconds; ignored if `frames` is given.
     pub seconds: Option<u32>,
-    /// Frames per second; by default as many as this machine can process, at most 5.
+    /// Frames per second. By default, as many as this machine can process, but at most 5.
     pub rate_hz: Option<f64>,
     /// The action of the person.
     pub action: Action,
@@ -34,15 +35,16 @@ pub struct Options {
 /// Configurable limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// Smallest share of frames with a result, in percent.
+    /// Smallest percentage of frames that must have a result.
     pub min_results: f64,
-    /// Smallest share of results with a skeleton, in percent.
+    /// Smallest percentage of results that must have a skeleton.
     pub min_skeletons: f64,
     /// Smallest PCP3D at gamma 0.5 over all results, in percent.
     pub min_pcp3d: f64,
-    /// Longest time until a result uses a frame of the killed camera again, milliseconds, on a machine that
-    /// keeps up with 5 frames per second.
+    /// Longest time until a result uses a frame of the killed camera again, in milliseconds, on a machine that can process 5 frames per
+    /// second.
     pub max_return_ms: f64,
-    /// Longest pause between results while the killed camera is missing, milliseconds, on a machine that keeps up with 5 frames per second.
+    /// Longest pause between results while the killed camera is missing, in milliseconds, on a machine that can process 5 frames per
+    /// second.
     pub max_pause_ms: f64,
 }

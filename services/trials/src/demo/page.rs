@@ -1,4 +1,4 @@
-//! Content of the demo's HTML page: tables, skeletons in space, and pictures.
+//! Content of the demo's HTML page: tables, 3D skeletons, and pictures.
 
 use std::path::Path;
 
@@ -267,7 +267,7 @@ fn accounts(run: &Run<'_>) -> Table {
     table
 }
 
-/// Returns strips of overlays of some frames in all views; see [`chosen`].
+/// Returns rows of pictures with overlays: the frames that [`chosen`] returns, in all views.
 fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     let file = |camera: &String, frame: u64| {
         folder.join("overlays").join(camera).join(format!("{frame:06}.png"))
@@ -295,8 +295,8 @@ fn strips(run: &Run<'_>, cost: Option<&Cost>, folder: &Path) -> Vec<Strip> {
     shown.iter().map(strip).collect()
 }
 
-/// Returns the frames to show: the first complete frame, the last complete one before the kill, the first without the camera, and the
-/// last complete one.
+/// Returns the frames to show: the first complete frame, the last complete frame before the kill, the first frame without the killed
+/// camera, and the last complete frame.
 ///
 /// * `drawn`: the frames with overlays.
 /// * `killed_at`: the last frame of the killed camera before the kill.
@@ -332,7 +332,7 @@ mod tests {
     use super::*;
     use crate::trial::results::ViewResult;
 
-    /// Returns a frame with overlays, with all four cameras or without the killed one.
+    /// Returns a frame with overlays, either with all four cameras, or without the killed one.
     fn drawn(frame: u64, is_complete: bool) -> FrameResult {
         let mut views = vec![ViewResult::default(); 4];
         views[VICTIM].missing = (!is_complete).then(|| "process lost".to_owned());

@@ -1,4 +1,4 @@
-//! Report on the demo: accuracy, cost of the kill, and limits, as text and as JSON.
+//! Report on the demo: accuracy, effects of the kill, and limits, as text and as JSON.
 
 use core::fmt::Write as _;
 use std::path::Path;
@@ -18,7 +18,7 @@ use crate::trial::results::FrameResult;
 pub(super) struct Report {
     /// Accuracy of all results, of the results with every view, and of the results without the killed camera's view.
     pub scores: [(&'static str, Score); 3],
-    /// Cost of the kill; `None` if no kill was planned.
+    /// Effects of the kill; `None` if no kill was planned.
     pub cost: Option<Cost>,
     /// Limits, with the measured values.
     pub limits: Vec<Limit>,

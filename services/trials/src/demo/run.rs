@@ -21,7 +21,7 @@ pub(super) struct Run<'a> {
     pub rate_hz: f64,
     /// Time that a stage waits for a late view, in milliseconds.
     pub deadline_ms: f64,
-    /// Speed of this machine, measured before or after the run, whichever is slower.
+    /// Speed of this machine: the slower of the measurements before and after the run.
     pub machine: Option<Machine>,
     /// The names of all processes except the supervisor.
     pub processes: &'a [String],
@@ -29,7 +29,7 @@ pub(super) struct Run<'a> {
     pub report: &'a Report,
     /// Results of the run.
     pub results: &'a [FrameResult],
-    /// The true joints of each result, metres in the world.
+    /// The true joints of each result in world coordinates, in metres.
     pub truth: &'a [Vec<Point>],
     /// Times of the kill; `None` if no kill was planned.
     pub killed: Option<FaultTimes>,

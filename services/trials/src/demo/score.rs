@@ -14,12 +14,12 @@ pub(super) const GAMMA: f64 = 0.5;
 pub(super) struct Score {
     /// Number of results.
     pub frames: usize,
-    /// PCP3D: percentage of segments whose mean end error is at most half their length. A segment that was not found
-    /// counts as wrong. `None` if there are no results.
+    /// PCP3D: percentage of segments for which the mean error of both ends is at most half of the segment's length. A segment that was not
+    /// found counts as wrong. `None` if there are no results.
     pub pcp3d_percent: Option<f64>,
-    /// MPJPE: mean distance of the found joints from the truth, in millimetres.
+    /// MPJPE: mean distance of the found joints from their true positions, in millimetres.
     pub mpjpe_mm: Option<f64>,
-    /// Share of joints that were not found, in percent.
+    /// Percentage of joints that were not found.
     pub lost_percent: Option<f64>,
     /// PCP3D of every segment, in percent.
     pub segments: Vec<(&'static str, Option<f64>)>,

@@ -1,14 +1,14 @@
-//! Cost of a process fault: the downtime, and the results of the other processes in the meantime.
+//! Effects of a process fault: the downtime, and the results of the other processes in the meantime.
 
 use serde::Serialize;
 
 use super::injection::FaultTimes;
 use super::results::FrameResult;
 
-/// Cost of a process fault. Times are in milliseconds after the fault.
+/// Effects of a process fault. Times are in milliseconds after the fault.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct Cost {
-    /// Time of the injection, milliseconds since the planning of the run; `None` if the fault was not injected.
+    /// Time of the injection, in milliseconds since the planning of the run; `None` if the fault was not injected.
     pub killed_at_ms: Option<f64>,
     /// Time until the supervisor noticed the fault.
     pub noticed_ms: Option<f64>,
@@ -16,13 +16,13 @@ pub(crate) struct Cost {
     pub restarted_ms: Option<f64>,
     /// Time until the process sent its first message after the fault that contributed to a result.
     pub back_ms: Option<f64>,
-    /// Last frame of the process with a result before the fault.
+    /// Last frame of the process that was used in a result before the fault.
     pub last_frame: Option<u64>,
-    /// First frame of the process with a result after the fault.
+    /// First frame of the process that was used in a result after the fault.
     pub first_frame: Option<u64>,
     /// Number of frames between `last_frame` and `first_frame`.
     pub frames_lost: Option<u64>,
-    /// Number of results, from the other views, of frames between `last_frame` and `first_frame`.
+    /// Number of results that the other views produced for frames between `last_frame` and `first_frame`.
     pub results_without_it: usize,
     /// Longest time between two results while the process was missing.
     pub longest_pause_ms: Option<f64>,
@@ -30,22 +30,22 @@ pub(crate) struct Cost {
     pub usual_pause_ms: Option<f64>,
 }
 
-/// Part of a result that has the epoch of a process.
+/// The part of a result that contains the epoch of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EpochSource {
-    /// The process is the camera of this view.
+    /// The process captures the frames of this view.
     Camera(usize),
     /// The process is the pose stage of this view.
     Pose(usize),
     /// The process makes the results.
     Result,
-    /// No part: only the process's health messages have its epoch.
+    /// No part of a result: only the health messages of the process contain its epoch.
     Unrecorded,
 }
 
 impl EpochSource {
-    /// Returns the epoch of the process in a result, and the time at which the process sent its message, milliseconds since the planning of
-    /// the run.
+    /// Returns the epoch of the process in a result, and the time at which the process sent its message, in milliseconds since the planning
+    /// of the run.
     fn epoch(self, result: &FrameResult) -> Option<(u32, f64)> {
         match self {
             Self::Camera(view) => {
@@ -57,7 +57,7 @@ impl EpochSource {
         }
     }
 
-    /// Returns the time at which the process sent its first message of an epoch that contributed to a result, milliseconds since the
+    /// Returns the time at which the process sent its first message of an epoch that contributed to a result, in milliseconds since the
     /// planning of the run; `None` if there is no result with this epoch.
     pub(crate) fn began_ms(self, epoch: u32, results: &[FrameResult]) -> Option<f64> {
         let mut sent = results.iter().filter_map(|result| self.epoch(result));
@@ -68,7 +68,7 @@ impl EpochSource {
 impl Cost {
     /// Computes the cost from the times of the fault and the results of the run.
     ///
-    /// * `source`: the part of a result that has the epoch of the process.
+    /// * `source`: the part of a result that contains the epoch of the process.
     /// * `times`: the times of the fault.
     /// * `session`: the session, which is the time of planning (`failure::now_nanos`).
     pub(crate) fn new(
@@ -87,7 +87,8 @@ impl Cost {
         let (old, new): (Vec<_>, Vec<_>) = epochs.partition(|epoch| epoch.1.0 == 0);
         let (last, first) = (old.last(), new.first());
         let recovered = times.recovered.filter(|_| source == EpochSource::Unrecorded).map(after);
-        // The pause ends with the first result of the new epoch, or otherwise with the first result after the recovery.
+        // The pause ends with the first result of the new epoch or, if results do not show the epoch, with the first result after the
+        // recovery.
         let is_after_recovery =
             |result: &&FrameResult| recovered.is_some_and(|ms| result.sent_ms >= injected_at + ms);
         let end = first
@@ -121,8 +122,8 @@ impl Cost {
     }
 }
 
-/// Returns the longest time between two consecutive results, in milliseconds. The later of the two must have been sent in the given span,
-/// both ends included.
+/// Returns the longest time between two consecutive results, in milliseconds. The later result must have been sent in the given time span,
+/// which includes both ends.
 fn longest_pause(results: &[FrameResult], from: f64, to: f64) -> Option<f64> {
     let pairs = results.windows(2).map(|pair| [pair[0].sent_ms, pair[1].sent_ms]);
     let inside = pairs.filter(|pair| pair[1] >= from && pair[1] <= to);
@@ -136,7 +137,8 @@ mod tests {
     use super::super::results::ViewResult;
     use super::*;
 
-    /// Returns a result that was sent at a given time, and whose processes all have the given epoch. Without an epoch, the view is missing.
+    /// Returns a result that was sent at a given time, and whose processes all have the given epoch. If no epoch is given, the view is
+    /// missing.
     fn moment(frame: u64, sent_ms: f64, epoch: Option<u32>) -> FrameResult {
         let camera = epoch.map(|epoch| CameraTimes {
             epoch,

@@ -12,7 +12,7 @@ pub enum ProcessFault {
     Kill,
     /// The process is stopped (SIGSTOP), as if it hung.
     Stop,
-    /// The process enters an endless loop. It does so itself: see `--spin-after`.
+    /// The process enters an endless loop. It is started with an option that makes it do so: see `--spin-after`.
     Spin,
 }
 
@@ -53,7 +53,7 @@ pub(crate) struct Injector {
     times: FaultTimes,
 }
 
-/// Times of a fault, nanoseconds (`failure::now_nanos`).
+/// Times of a fault, in nanoseconds (`failure::now_nanos`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct FaultTimes {
     /// Time of the injection.
@@ -136,8 +136,8 @@ impl Injector {
         }
     }
 
-    /// Returns the process whose health messages show that it is time. This is the process that makes the results. For `Spin`, it is the
-    /// process itself, which does not continue after its frame.
+    /// Returns the process whose health messages determine when the fault is injected. This is usually the process that makes the results.
+    /// For `Spin`, it is the process with the fault, which stops working after the given frame.
     fn trigger(&self) -> &str {
         match self.fault {
             ProcessFault::Kill | ProcessFault::Stop => "triangulate",
@@ -194,7 +194,7 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Passes an event at a time, and returns the id of the process with the fault, and the message.
+    /// Handles an event at the given time, and returns the id of the process with the fault, and the message.
     fn handle_at(
         injector: &mut Injector,
         event: &Event<'_>,

@@ -36,7 +36,7 @@ pub(crate) fn none_of(what: &str, got: &[String]) -> Limit {
     }
 }
 
-/// * `got`: the measured number; a limit without a measured number is missed.
+/// * `got`: the measured number. If it is missing, the limit counts as missed.
 fn limit(what: &str, asked: String, got: Option<f64>, held: bool) -> Limit {
     let digits = |value: f64| usize::from(value.fract() != 0.0);
     Limit {

@@ -15,9 +15,9 @@ pub(crate) struct FrameResult {
     pub frame: u64,
     /// Epoch of the process that made the result.
     pub epoch: u32,
-    /// Time at which the result was sent, milliseconds since the planning of the run.
+    /// Time at which the result was sent, in milliseconds since the planning of the run.
     pub sent_ms: f64,
-    /// Joints of `skeleton::PARSE14` of the followed person, metres in the world; `None` for a joint that was not found.
+    /// Joints of `skeleton::PARSE14` of the followed person in world coordinates, in metres; `None` for a joint that was not found.
     pub joints: Vec<Option<Point>>,
     /// Views in the order of the rig.
     pub views: Vec<ViewResult>,
@@ -40,7 +40,7 @@ impl FrameResult {
         self.joints.iter().any(Option::is_some)
     }
 
-    /// Returns the time at which the first picture of the result was captured, milliseconds since the planning of the run.
+    /// Returns the time at which the first picture of the result was captured, in milliseconds since the planning of the run.
     pub(crate) fn captured_ms(&self) -> Option<f64> {
         let shots = self.views.iter().filter_map(|view| view.camera);
         shots.map(|shot| shot.captured_ms).reduce(f64::min)

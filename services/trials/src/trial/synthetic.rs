@@ -17,7 +17,7 @@ const RADIUS: f64 = 4.2;
 const HEIGHT: f64 = 1.5;
 /// Scale of the images relative to the ring's default: 320x240 pixels, so that two cores can render and process four views.
 const SCALE: f64 = 0.5;
-/// Every n-th frame has overlays.
+/// Interval between frames with overlays, in frames.
 const OVERLAY_EVERY: u64 = 4;
 
 /// Method that finds the person.
@@ -25,7 +25,7 @@ const OVERLAY_EVERY: u64 = 4;
 pub(crate) enum Finder {
     /// The default method: the shipped network.
     Default,
-    /// The filters, near the last pose.
+    /// The filters, which search near the last pose.
     TrackingFilters,
 }
 
@@ -159,7 +159,7 @@ impl SyntheticDeployment {
         )
     }
 
-    /// Returns the true positions of the joints of `skeleton::PARSE14` in the given frames, metres in the world.
+    /// Returns the true positions of the joints of `skeleton::PARSE14` in the given frames, in world coordinates, in metres.
     pub(crate) fn truth(
         &self,
         frames: impl Iterator<Item = u64>,
@@ -173,7 +173,7 @@ impl SyntheticDeployment {
 /// Returns the camera with images scaled by `SCALE`.
 fn scaled(camera: &Camera) -> Camera {
     let intrinsics = camera.intrinsics;
-    // The centre of the top-left pixel is at 0.
+    // In both images, the centre of the top-left pixel is at 0.
     let centre = |at: f64| SCALE * (at + 0.5) - 0.5;
     Camera {
         intrinsics: Intrinsics {
