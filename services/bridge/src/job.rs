@@ -24,9 +24,9 @@ pub struct Job {
     pub maps: Vec<ViewMaps>,
     /// Width and height of the frames of every view of the deployment, in pixels.
     pub sizes: Vec<[u32; 2]>,
-    /// Time from the start of the session to the first instant at which all cameras take a picture, in nanoseconds.
+    /// Time from the start of the session to the nominal time of the first frame, in nanoseconds.
     pub lead_nanos: u64,
-    /// Time from one common instant of the cameras to the next, in nanoseconds.
+    /// Time from the nominal time of a frame to that of the next frame, in nanoseconds.
     pub period_nanos: f64,
     /// The first frame of the footage.
     pub start_frame: u64,
@@ -89,12 +89,12 @@ impl Job {
         }
     }
 
-    /// Returns the index of the instant of a frame of the footage.
+    /// Returns the index, among the frame times of the run, of a frame of the footage.
     pub(crate) fn nth(&self, frame: u64) -> u64 {
         frame.saturating_sub(self.start_frame) / self.frame_step.max(1)
     }
 
-    /// Returns the frame of the footage at an instant.
+    /// Returns the frame of the footage that belongs to a frame time with this index.
     pub(crate) fn frame(&self, nth: u64) -> u64 {
         self.start_frame.saturating_add(nth.saturating_mul(self.frame_step))
     }

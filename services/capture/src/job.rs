@@ -17,7 +17,7 @@ pub struct Job {
     /// Footage of the camera.
     pub source: SourceSpec,
     /// For cameras with clocks of their own: the frame that belongs to each common instant (a time at which all cameras should take a
-    /// picture). `source` then counts instants.
+    /// picture). `source` then counts these instants.
     pub timeline: Option<Timeline>,
     /// Settings of the camera if it is live. In this case, only the choice of frames in `source` is used.
     pub live: Option<LiveJob>,

@@ -27,14 +27,14 @@ pub struct LiveJob {
     pub camera: LiveCamera,
     /// Size of the pictures, in pixels.
     pub size: footage::Size,
-    /// Number of common instants per second, before `frame_step`.
+    /// Number of frames per second, before `frame_step` is applied.
     pub rate_hz: f64,
     /// True if the original pictures are recorded.
     pub is_kept: bool,
     /// Name of the camera.
     pub name: String,
-    /// Largest difference between the times of pictures and their instants that causes no warning, in nanoseconds.
+    /// Largest difference between the times of pictures and the nominal times of their frames that causes no warning, in nanoseconds.
     pub max_skew_nanos: u64,
-    /// Time from the beginning of the run to the first common instant of the cameras, in nanoseconds. It is the same for all cameras.
+    /// Time from the beginning of the run to the nominal time of the first frame, in nanoseconds. It is the same for all cameras.
     pub lead_nanos: u64,
 }

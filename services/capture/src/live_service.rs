@@ -12,7 +12,7 @@ use crate::job::Job;
 use crate::kept::Kept;
 use crate::live::{Grid, LiveJob, Phase, Picture, Source};
 
-/// Time for which the process waits for the picture of an instant. Two frame periods are added to it.
+/// Time after the nominal time of a frame for which the process waits for its picture. Two frame periods are added to it.
 const PATIENCE_NANOS: u64 = 250_000_000;
 /// Longest wait for a picture, so that a stop request is noticed.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -31,12 +31,12 @@ struct Live<'a, 'b> {
     phase: Phase,
     guard: Guard,
     counts: CameraCounts,
-    /// Index of the next instant.
+    /// Index of the next frame.
     at: u64,
     /// Reason why pictures were refused since the last used one.
     refused: Option<Status>,
-    /// Reason why the last instant has no picture, if it has none. The next fields are the number of interruptions by cause, and whether
-    /// the current interruption was logged.
+    /// Reason why the last frame has no picture, if it has none. The next fields are the number of interruptions by cause, and whether the
+    /// current interruption was logged.
     trouble: Option<Status>,
     said: Vec<(Status, u64)>,
     has_said: bool,
@@ -89,7 +89,7 @@ pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Fa
     if let Some(kept) = &mut kept {
         kept.end()?;
     }
-    // All instants of the run have passed, so waiting pictures are discarded.
+    // All frames of the run are over, so waiting pictures are discarded.
     while let Some(picture) = it.source.next(Duration::ZERO) {
         it.counts.n_surplus += 1;
         it.source.give_back(picture);
@@ -107,7 +107,7 @@ impl Live<'_, '_> {
         self.job.source.start + nth.saturating_mul(self.job.source.step)
     }
 
-    /// Sends a picture at its instant. Earlier instants that have no picture are reported as left out.
+    /// Sends a picture as the frame to which it belongs. Earlier frames that have no picture are reported as left out.
     fn take(&mut self, picture: &Picture, n_frames: u64) -> Result<(), Failure> {
         if let Some(why) = self.grid.wrong_clock(picture.at_nanos, picture.arrived_at_nanos) {
             (self.refused, self.counts.n_refused) = (Some(why), self.counts.n_refused + 1);
@@ -153,7 +153,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Sends the reason why the next instant has no picture.
+    /// Sends the reason why the next frame has no picture.
     fn send_nothing(&mut self, status: Status) -> Result<(), Failure> {
         let index = self.index(self.at);
         self.say_why(index, status);
@@ -205,7 +205,7 @@ impl Live<'_, '_> {
         self.camera.note(self.at);
     }
 
-    /// Gives up instants whose picture is overdue. If the camera is known to be disconnected, does not wait for pictures.
+    /// Gives up frames whose picture is overdue. If the camera is known to be disconnected, does not wait for pictures.
     fn give_up_overdue(&mut self, n_frames: u64) -> Result<(), Failure> {
         let trouble = self.source.trouble();
         let patience = match trouble {
@@ -219,7 +219,7 @@ impl Live<'_, '_> {
         Ok(())
     }
 
-    /// Logs once if pictures are taken too long before or after their instants.
+    /// Logs once if pictures are taken too long before or after the nominal times of their frames.
     fn warn_of_skew(&mut self) {
         let Some(skew) = self.phase.skew_nanos() else {
             return;

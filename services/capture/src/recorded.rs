@@ -99,7 +99,7 @@ impl Recorded {
     }
 }
 
-/// The pictures of a camera in a recording, at the instants of the recorded run or at another rate.
+/// The pictures of a camera in a recording, at the frame rate of the recorded run or at another rate.
 #[derive(Debug)]
 pub struct RecordedFeed {
     pub(crate) info: FeedInfo,

@@ -1,4 +1,4 @@
-//! Footage resampled at common instants: each instant gets the nearest frame.
+//! Footage resampled at the frame times that all cameras share: each frame of the run gets the nearest picture.
 
 use deployment::Timeline;
 use footage::{Complaints, FootageError, FrameView, SourceSpec};
@@ -6,21 +6,21 @@ use footage::{Complaints, FootageError, FrameView, SourceSpec};
 use crate::feed::{Feed, FeedError};
 use crate::info::FeedInfo;
 
-/// The frames of a camera: at common instants if it has a timeline, otherwise as in the footage.
+/// The frames of a camera: resampled at the common frame times if the camera has a timeline, otherwise as in the footage.
 #[derive(Debug)]
 pub struct Retimed {
     feed: Feed,
     times: Option<Times>,
 }
 
-/// The instants to use, and the position in the footage.
+/// The common frame times to use, and the position in the footage.
 #[derive(Debug)]
 struct Times {
     timeline: Timeline,
     start: u64,
     step: u64,
     n_instants: u64,
-    /// Position of the next instant among the used instants.
+    /// Index of the next frame time among those that are used.
     at: u64,
     /// Index of the next frame that the footage delivers. `shown` is the index of the last delivered frame.
     next: u64,
@@ -40,7 +40,7 @@ fn whole(spec: &SourceSpec, from: u64) -> SourceSpec {
 impl Retimed {
     /// Returns the properties of the pictures.
     ///
-    /// * `spec`: counts instants if there is a timeline.
+    /// * `spec`: counts common frame times if there is a timeline, and frames of the footage otherwise.
     ///
     /// # Errors
     ///
@@ -60,7 +60,7 @@ impl Retimed {
 
     /// Opens the footage.
     ///
-    /// * `spec`: counts instants if there is a timeline.
+    /// * `spec`: counts common frame times if there is a timeline, and frames of the footage otherwise.
     ///
     /// # Errors
     ///
@@ -116,7 +116,7 @@ impl Retimed {
         self.feed.complaints()
     }
 
-    /// Skips frames or instants. Returns the number that were skipped.
+    /// Skips frames (or common frame times, if there is a timeline). Returns the number that were skipped.
     ///
     /// # Errors
     ///
@@ -130,7 +130,7 @@ impl Retimed {
         Ok(n)
     }
 
-    /// Returns the next picture. If frames are missing in the footage, this picture may belong to a later instant. Returns `None` at the
+    /// Returns the next picture. If frames are missing in the footage, this picture may belong to a later frame time. Returns `None` at the
     /// end.
     ///
     /// # Errors
@@ -173,12 +173,12 @@ impl Retimed {
 }
 
 impl Times {
-    /// Returns the next instant.
+    /// Returns the next common frame time.
     fn instant(&self) -> u64 {
         self.start.saturating_add(self.at.saturating_mul(self.step))
     }
 
-    /// Returns the frame nearest to the next instant.
+    /// Returns the frame of the footage that is nearest to the next common frame time.
     fn wanted(&self) -> u64 {
         self.timeline.frame(self.instant())
     }

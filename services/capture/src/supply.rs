@@ -33,11 +33,11 @@ pub(crate) enum Step {
 #[derive(Debug)]
 pub(crate) struct Supply {
     spec: SourceSpec,
-    /// Timeline of a camera with a clock of its own. `spec` then counts instants.
+    /// Timeline of a camera with a clock of its own. `spec` then counts common frame times.
     timeline: Option<Timeline>,
     faults: Faults,
     info: FeedInfo,
-    /// True if frames follow a clock, so that a camera may come back.
+    /// True if frames follow a clock, so that a lost camera may be reopened.
     is_live: bool,
     feed: Option<Retimed>,
     /// Position of the next frame among the used frames.
@@ -57,7 +57,7 @@ pub(crate) struct Supply {
 impl Supply {
     /// Opens the footage, or creates the scene.
     ///
-    /// * `is_live`: true if frames follow a clock, and a lost camera may come back.
+    /// * `is_live`: true if frames follow a clock, and a lost camera may be reopened.
     /// * `frozen_after`: see [`deployment::capture::Config::frozen_after`].
     ///
     /// # Errors
@@ -106,8 +106,8 @@ impl Supply {
         self.spec.start.saturating_add(offset)
     }
 
-    /// Returns the time from the instant of a frame until its picture was taken, in nanoseconds; 0 for cameras without a clock of their
-    /// own.
+    /// Returns the time from the nominal time of a frame until its picture was taken, in nanoseconds; 0 for cameras without a clock of
+    /// their own.
     pub(crate) fn rest_nanos(&self, index: u64) -> i64 {
         self.timeline.map_or(0, |timeline| timeline.rest_nanos(index))
     }

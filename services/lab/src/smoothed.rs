@@ -206,7 +206,7 @@ fn tried(
 
 /// Returns a row for every method that has positions.
 ///
-/// * `tried`: errors by method and instant.
+/// * `tried`: errors by method and time.
 fn rows(tried: &[Vec<Tried>], bootstrap: &Bootstrap) -> Vec<Row> {
     let row = |(method, tried): (&&'static str, &Vec<Tried>)| {
         let mean = |factor: f64, of: &dyn Fn(&Tried) -> Sum| {

@@ -17,7 +17,7 @@ use crate::resolved::Resolved;
 pub struct SentFrame<'a> {
     /// Picture of the frame.
     pub image: Rgb8View<'a>,
-    /// Time from the instant of the frame until the picture was taken, in nanoseconds.
+    /// Time from the nominal time of the frame until the picture was taken, in nanoseconds.
     pub skew_nanos: i64,
 }
 

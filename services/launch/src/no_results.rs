@@ -4,7 +4,7 @@ use runfiles::Summary;
 
 use crate::views::ViewReport;
 
-/// Returns the reason why a run has no joints in space. Returns `None` if it has some, or if its only view shows a person.
+/// Returns the reason why a run has no 3D joints. Returns `None` if it has some, or if its only view shows a person.
 ///
 /// * `summary`: the summary that the process `results` wrote.
 /// * `views`: the reports of all views.

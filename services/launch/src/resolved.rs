@@ -73,8 +73,8 @@ impl Resolved {
         live.map(|view| view.0).collect()
     }
 
-    /// Returns the rate of the common instants of live cameras, per second, before `frame_step`. The deployment sets it; otherwise it is
-    /// the rate of the slowest camera.
+    /// Returns the frame rate of a run with live cameras, per second, before `frame_step` is applied. The deployment sets it; otherwise it
+    /// is the rate of the slowest camera.
     pub fn instants_hz(&self) -> f64 {
         let step = self.deployment.capture.frame_step as f64;
         let own = self.footage.iter().filter_map(|footage| footage.frame_rate_hz);
@@ -82,7 +82,7 @@ impl Resolved {
         self.deployment.capture.frame_rate_hz.unwrap_or(slowest)
     }
 
-    /// Returns the frame rate of the footage, per second, before `frame_step`, if it is known.
+    /// Returns the frame rate of the footage, per second, before `frame_step` is applied; `None` if it is not known.
     pub fn frame_rate_hz(&self) -> Option<f64> {
         let capture = &self.deployment.capture;
         let step = capture.frame_step as f64;

@@ -228,7 +228,7 @@ impl Report {
             || summary.writes_failed > 0
     }
 
-    /// Returns the reason why the run has no joints in space; `None` for an interrupted run.
+    /// Returns the reason why the run has no 3D joints; `None` for an interrupted run.
     fn no_results_reason(&self) -> Option<String> {
         let summary = self.recorded.summary().filter(|_| !self.interrupted)?;
         no_results::reason(summary, &self.views)

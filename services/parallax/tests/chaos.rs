@@ -83,7 +83,7 @@ mod long {
         for it in scenarios {
             let measured = &it["measured"];
             let expected = json!([{ "process": measured["process"], "restarts": 1 }]);
-            // On a loaded machine the footage may end before the process is back.
+            // On a loaded machine, the footage may end before the process has been restarted.
             assert_eq!(it["run"]["restarts"], expected, "{it:#}");
         }
     }

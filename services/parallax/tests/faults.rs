@@ -248,7 +248,7 @@ fn a_live_run_continues_without_a_suspended_view_until_it_is_back() {
     assert_back_after_a_gap(&case.lines("pose3d.jsonl"));
 }
 
-/// Checks that view `b` was first late, then lost with its process, and came back.
+/// Checks that view `b` was first late, was then lost with its process, and was used again afterwards.
 fn assert_back_after_a_gap(lines: &[Value]) {
     let n_without_b = lines.iter().filter(|line| line["views_present"] == json!(["a", "c"]));
     assert!(n_without_b.count() > 3, "{lines:?}");

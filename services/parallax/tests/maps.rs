@@ -424,7 +424,7 @@ fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_
 #[test]
 fn what_keypoints_have_beside_the_joints_is_written_by_name() {
     let case = case("extra", [Some(as_it_is as Named); 4]);
-    // The third view exchanges left and right of the legs.
+    // The third view swaps the left and the right leg.
     let named = |view: usize, name: &str| {
         let leg = ["hip", "knee", "ankle", "toe", "heel"];
         let is_leg = leg.iter().any(|part| name.ends_with(part));

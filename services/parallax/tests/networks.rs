@@ -265,7 +265,7 @@ fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
             let at: Vec<f64> = serde_json::from_value(found[0]["joints"][joint].clone()).unwrap();
             (at[0] - truth.x).hypot(at[1] - truth.y)
         };
-        // One view may exchange left and right.
+        // One view may swap left and right.
         let off = |sides: [&str; 2]| {
             let joints = ["ankle", "knee", "hip", "shoulder", "elbow", "wrist"];
             let each = joints.iter().flat_map(|joint| {

@@ -209,7 +209,7 @@ fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
     let spun = &report["scenarios"][0];
     let process = &spun["measured"]["process"];
     let expected = json!([{ "process": process, "restarts": 1 }]);
-    // On a loaded machine the footage may end before the process is back.
+    // On a loaded machine, the footage may end before the process has been restarted.
     assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
 }
 

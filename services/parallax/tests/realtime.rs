@@ -83,7 +83,7 @@ fn footage_without_a_frame_rate_ends_at_once_and_dropped_frames_are_counted() {
     let case = Case::new("unpaced", &[60; 2], LIVE);
     let ended = case.run();
     let run = Finished::new(&case, &ended);
-    // If there was never a frame of both views in time, there is no pose in space, and the report states this.
+    // If there was never a frame of both views in time, there is no 3D pose, and the report states this.
     let is_empty = run.report["recorded"]["summary"]["frames_with_pose"] == 0;
     let expected = if is_empty { 7 } else { 0 };
     assert_eq!(ended.status.code(), Some(expected), "{:#}", run.report);

@@ -112,7 +112,8 @@ fn clocks_are_found_written_and_used() {
     assert_eq!(lines.len(), 6);
     for line in lines {
         let instant = line["frame"].as_u64().unwrap() as f64;
-        // Instant 0 is the beginning of the second camera. Without the camera's clock offset, people would be half a metre apart.
+        // Frame 0 of the run is at the time at which the second camera begins. Without the camera's clock offset, people would be half a
+        // metre apart.
         let truth = scene.joints(BEGIN_S[1] + instant / RATE_HZ);
         let head = &line["people"][0]["joints"]["head"]["position_m"];
         let head = [0, 1, 2].map(|axis| head[axis].as_f64().unwrap_or(f64::NAN));

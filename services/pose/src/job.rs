@@ -21,7 +21,7 @@ pub struct Keypoints {
 pub struct Source {
     /// The files.
     pub files: KeypointSource,
-    /// For cameras with clocks of their own: the assignment of frames in the files to the instants that all cameras share.
+    /// For cameras with clocks of their own: the assignment of frames in the files to the frames of the run.
     pub timeline: Option<Timeline>,
     /// Mapping from pixels of the footage to pixels of the frame: `[[a, b, c], [d, e, f]]`.
     pub frame_from_source: [[f64; 3]; 2],

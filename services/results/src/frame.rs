@@ -48,7 +48,7 @@ pub struct Absent {
 /// A message of a fusion process, without its poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FusedRecord {
-    /// Index of the pair; 0 if all views are solved at once in space.
+    /// Index of the pair of views; 0 if all views are solved at once in 3D.
     pub index: usize,
     /// Status of the result: good, or why it is missing.
     pub status: Status,

@@ -92,7 +92,7 @@ impl ViewHistory {
         let is_gone = |port: &u128| !ports.iter().flatten().any(|other| other == port);
         let is_lost = self.ports.iter().flatten().any(is_gone);
         self.lost_process |= is_lost && self.last_frame.is_some();
-        // A pose may belong to a frame that capture sent before its death, so a pose does not show that capture is back.
+        // A pose may belong to a frame that capture sent before its death, so a pose does not show that capture has been restarted.
         self.lost_capture |= self.ports[0].iter().any(is_gone) && self.captured.is_some();
         self.ports = ports;
     }

@@ -1,4 +1,4 @@
-//! Compares the poses that every view found alone with the followed person in space.
+//! Compares the poses found in every single view with the 3D pose of the followed person.
 
 use geometry::Camera;
 use messages::{Joint3d, SkeletonMessage};

@@ -22,9 +22,9 @@ pub(crate) struct Counted {
     most: u32,
     /// Ids of all people who were followed.
     ids: BTreeSet<u64>,
-    /// People who are present, or may come back.
+    /// People who are present, or may return with the same id.
     each: BTreeMap<u64, One>,
-    /// Summaries of people who cannot come back.
+    /// Summaries of people who would get a new id if they returned.
     gone: BTreeMap<u64, PersonSummary>,
 }
 
@@ -113,7 +113,8 @@ impl Counted {
         one.seen_s = time_s.unwrap_or(one.seen_s);
     }
 
-    /// Reduces people who cannot come back to their summaries. Called after the people of a frame were added.
+    /// Reduces the data of people who have been absent for too long to return with the same id to summaries. Called after the people of a
+    /// frame were added.
     pub(crate) fn forget(&mut self, now_s: f64) {
         let gone = self.each.extract_if(.., |_, one| now_s - one.seen_s > GONE_S);
         self.gone.extend(gone.map(|(id, one)| (id, one.summary(id))));

@@ -16,7 +16,7 @@ use crate::people::GONE_S;
 #[derive(Debug)]
 pub(crate) struct Smoothing {
     people: BTreeMap<u64, Person>,
-    /// People who cannot come back.
+    /// People who would get a new id if they returned.
     gone: BTreeMap<u64, SmoothedPerson>,
     /// Names of the joints, then of the extra keypoints.
     names: Vec<String>,
@@ -87,7 +87,8 @@ impl Smoothing {
         self.file.append(&runfiles::to_line(&line)?)
     }
 
-    /// Removes the smoothers of people who cannot come back, because a run of days sees many people.
+    /// Removes the smoothers of people who have been absent for too long to return with the same id, because a run of several days sees
+    /// many people.
     fn forget(&mut self, time_s: f64) {
         let names = &self.names;
         let gone = self.people.extract_if(.., |_, person| time_s - person.seen_s > GONE_S);

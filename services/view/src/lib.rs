@@ -1,4 +1,4 @@
-//! A page in the browser that shows a deployment while it runs, or a finished run. It shows the skeleton in space with its uncertainty, the
+//! A page in the browser that shows a deployment while it runs, or a finished run. It shows the 3D skeleton with its uncertainty, the
 //! pictures of all cameras, rates, latency, missing processes, and errors.
 //!
 //! A thread follows the deployment ([`runtime::Bus::as_onlooker`]) and puts the newest messages on a board. Every open page has a thread

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::scene::Scene;
 
-/// One frame: the skeletons in space, the pose in every view, and reasons for missing data.
+/// One frame: the 3D skeletons, the pose in every view, and reasons for missing data.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Moment {
     /// Always `moment`.

@@ -157,8 +157,8 @@ pub fn consistency(input: &[u8]) {
     }
 }
 
-/// Card of a network or of a detector. If a card is accepted, its numbers can be used in computations, and its window contains the given
-/// box.
+/// Card of a network or of a detector. If a card is accepted, its numbers can be used in computations, and its input window can be filled
+/// from the given box.
 pub fn network_card(input: &[u8]) {
     let Ok(input) = core::str::from_utf8(input) else {
         return;

@@ -11,17 +11,17 @@ const SLACK: f64 = 0.1;
 pub struct Grid {
     /// Time of the first frame, in nanoseconds.
     pub start_nanos: u64,
-    /// Time from one common instant of the cameras to the next, in nanoseconds.
+    /// Time from the nominal time of a frame to that of the next frame, in nanoseconds.
     pub period_nanos: f64,
 }
 
 impl Grid {
-    /// Returns the time of an instant, in nanoseconds.
+    /// Returns the nominal time of a frame, in nanoseconds.
     pub fn at(&self, nth: u64) -> u64 {
         self.start_nanos.saturating_add((nth as f64 * self.period_nanos).round() as u64)
     }
 
-    /// Returns the index of the last instant at or before a time; 0 if there is none.
+    /// Returns the index of the last frame whose nominal time is not after the given time; 0 if there is none.
     pub fn latest(&self, nanos: u64) -> u64 {
         self.exact(nanos).max(0.0) as u64
     }
@@ -85,7 +85,7 @@ pub struct Tally {
 #[derive(Debug, Clone)]
 pub struct Arrivals {
     grid: Grid,
-    /// Time after its instant at which a frame is given up, in nanoseconds: the first value if its host answers, the second if not.
+    /// Time after its nominal time at which a frame is given up, in nanoseconds: the first value if its host answers, the second if not.
     patience: [u64; 2],
     n_frames: u64,
     next: u64,
@@ -95,8 +95,8 @@ pub struct Arrivals {
 impl Arrivals {
     /// Creates the state of a view.
     ///
-    /// * `patience`: time after its instant at which a frame is given up, in nanoseconds: the first value if its host answers, the second
-    ///   if not.
+    /// * `patience`: time after its nominal time at which a frame is given up, in nanoseconds: the first value if its host answers, the
+    ///   second if not.
     /// * `n_frames`: number of frames of the run.
     /// * `next`: the first frame that has not been published.
     pub fn new(grid: Grid, patience: [u64; 2], n_frames: u64, next: u64) -> Self {

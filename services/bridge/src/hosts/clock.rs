@@ -190,7 +190,7 @@ impl Clock {
         })
     }
 
-    /// Returns true if an exchange cannot come from the known clock.
+    /// Returns true if an exchange contradicts the current estimate of the clock.
     fn contradicts(&self, sample: &Sample) -> bool {
         let Some(known) = self.estimate(sample.at) else {
             return false;

@@ -37,7 +37,7 @@ pub enum Answer {
 pub struct Welcome {
     /// Start time of the bridge of the fusing host.
     pub origin: u64,
-    /// Session of the run: the time from which its instants are counted, by the clock of the fusing host, in nanoseconds.
+    /// Session of the run: the time from which its frame times are counted, by the clock of the fusing host, in nanoseconds.
     pub session: u64,
 }
 

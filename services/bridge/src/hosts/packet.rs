@@ -57,7 +57,7 @@ pub struct Head {
     pub sequence: u64,
     /// Number of the frame on the sending host.
     pub frame: u64,
-    /// Instant of the frame.
+    /// Nominal time of the frame.
     pub instant_nanos: u64,
     /// Time at which the picture was taken.
     pub captured_at_nanos: u64,

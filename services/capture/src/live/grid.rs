@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use messages::Status;
 
-/// Tolerance by which the time of a picture may differ from its instant by more than half a period, in periods. With this tolerance,
-/// pictures that jitter around the middle between two instants stay with the same instant.
+/// Tolerance added to the largest difference between the time of a picture and the nominal time of its frame, in periods. With it, pictures
+/// whose times jitter around the midpoint between two frame times are still assigned to the same frames.
 const SLACK: f64 = 0.1;
 /// Number of intervals whose median is the period of a camera.
 const N_INTERVALS: usize = 15;
@@ -14,7 +14,7 @@ const LEAST_INTERVALS: usize = 5;
 /// Largest accepted difference between a camera's clock and this machine's clock, in nanoseconds.
 const MAX_OFF_NANOS: u64 = 2_000_000_000;
 
-/// The instants `start + k / rate`. The caller passes the time, so no clock is read.
+/// The frame times `start + k / rate`. The caller passes the time, so no clock is read.
 #[derive(Debug)]
 pub(crate) struct Grid {
     start_nanos: u64,
@@ -25,9 +25,9 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Creates the instants.
+    /// Creates the frame times.
     ///
-    /// * `rate_hz`: number of instants per second.
+    /// * `rate_hz`: number of frames per second.
     pub(crate) fn new(start_nanos: u64, rate_hz: f64) -> Self {
         Self {
             start_nanos,
@@ -37,32 +37,32 @@ impl Grid {
         }
     }
 
-    /// Returns the time from one instant to the next, in nanoseconds.
+    /// Returns the time from one frame to the next, in nanoseconds.
     pub(crate) fn period_nanos(&self) -> u64 {
         self.period.round() as u64
     }
 
-    /// Returns the time of an instant, in nanoseconds.
+    /// Returns the nominal time of a frame, in nanoseconds.
     pub(crate) fn due_nanos(&self, nth: u64) -> u64 {
         self.start_nanos.saturating_add((nth as f64 * self.period).round() as u64)
     }
 
-    /// Returns the index of the last instant at or before `now_nanos`; 0 if there is none.
+    /// Returns the index of the last frame whose nominal time is not after `now_nanos`; 0 if there is none.
     pub(crate) fn latest(&self, now_nanos: u64) -> u64 {
         self.exact(now_nanos).max(0.0) as u64
     }
 
-    /// Returns the seconds since the first instant.
+    /// Returns the time since the first frame, in seconds.
     pub(crate) fn seconds(&self, at_nanos: u64) -> f64 {
         self.exact(at_nanos) * self.period * 1e-9
     }
 
-    /// Returns the time from an instant until a picture was taken, in nanoseconds.
+    /// Returns the time from the nominal time of a frame until a picture was taken, in nanoseconds.
     pub(crate) fn off_nanos(&self, at_nanos: u64, nth: u64) -> i64 {
         ((self.exact(at_nanos) - nth as f64) * self.period).round() as i64
     }
 
-    /// Returns the position of a time among the instants.
+    /// Converts a time to a fractional frame index.
     fn exact(&self, at_nanos: u64) -> f64 {
         at_nanos.cast_signed().wrapping_sub(self.start_nanos.cast_signed()) as f64 / self.period
     }
@@ -98,11 +98,11 @@ impl Grid {
         self.last = None;
     }
 
-    /// Returns the index of the instant to which a picture belongs: `next` or a later one. Returns `None` if every instant near the picture
-    /// already has a picture.
+    /// Returns the index of the frame to which a picture belongs: `next` or a later one. Returns `None` if every frame near the time of the
+    /// picture already has a picture.
     ///
-    /// The time of a picture differs from its instant by at most half the interval between instants or, if the camera is faster, half the
-    /// period of the camera, plus a tolerance of a tenth of the period. Therefore, cameras with the same rate keep their phase, and the
+    /// The time of a picture may differ from the nominal time of its frame by half the frame period or, if the camera is faster, by half
+    /// the period of the camera, plus a tolerance of a tenth of the period. Therefore, cameras with the same rate keep their phase, and the
     /// nearest picture of a faster camera is used.
     pub(crate) fn place(&self, at_nanos: u64, next: u64) -> Option<u64> {
         let exact = self.exact(at_nanos);
@@ -115,7 +115,7 @@ impl Grid {
         is_later.then_some(nearest as u64)
     }
 
-    /// Returns the period of the camera, in periods of the instants.
+    /// Returns the period of the camera, in frame periods of the run.
     fn own_period(&self) -> f64 {
         if self.intervals.len() < LEAST_INTERVALS {
             return 1.0;
@@ -134,7 +134,7 @@ mod tests {
 
     const START: u64 = 5_000_000_000;
 
-    /// Returns the instants of pictures whose times are given in periods of 30 Hz after the first instant.
+    /// Returns the frames to which pictures are assigned. The times of the pictures are given in periods of 30 Hz after the first frame.
     fn placed(times: impl IntoIterator<Item = f64>) -> Vec<Option<u64>> {
         let mut grid = Grid::new(START, 30.0);
         let mut next = 0;

@@ -17,8 +17,8 @@ pub(crate) struct Phase {
     period_nanos: u64,
     /// Times and skews of pictures that are not part of a measurement yet, in nanoseconds.
     newest: Vec<(u64, i64)>,
-    /// Times and skews of the measurements, in nanoseconds. When a camera drifts from one instant to the next, a whole period is added to
-    /// its skew, so that the skew does not jump.
+    /// Times and skews of the measurements, in nanoseconds. When a camera drifts so far that its pictures are assigned to other frames, a
+    /// whole period is added to its skew, so that the skew does not jump.
     measured: VecDeque<(u64, i64)>,
     /// Sum of the periods that were added so far, in nanoseconds.
     added: i64,
@@ -29,7 +29,7 @@ pub(crate) struct Phase {
 impl Phase {
     /// Creates a phase without measurements.
     ///
-    /// * `period_nanos`: time from one instant to the next, in nanoseconds.
+    /// * `period_nanos`: time from one frame to the next, in nanoseconds.
     pub(crate) fn new(period_nanos: u64) -> Self {
         Self {
             period_nanos,
@@ -54,7 +54,7 @@ impl Phase {
 
     /// Adds a picture. Returns true if there is a new measurement.
     ///
-    /// * `skew_nanos`: time from the picture's instant until it was taken, in nanoseconds.
+    /// * `skew_nanos`: time from the nominal time of the picture's frame until the picture was taken, in nanoseconds.
     pub(crate) fn add(&mut self, at_nanos: u64, skew_nanos: i64) -> bool {
         self.newest.push((at_nanos, skew_nanos));
         if self.newest.len() < N_PICTURES {
@@ -84,8 +84,8 @@ impl Phase {
         self.measured.back().map(|measured| measured.1.saturating_sub(self.added))
     }
 
-    /// Returns how fast the camera falls behind the instants, in parts per billion. It is negative for a camera that is too fast. Returns
-    /// `None` if the camera was measured for too short a time.
+    /// Returns how fast the camera falls behind the nominal frame times, in parts per billion. It is negative for a camera that is too
+    /// fast. Returns `None` if the camera was measured for too short a time.
     pub(crate) fn drift_ppb(&self) -> Option<i64> {
         let ends = self.measured.front().zip(self.measured.back())?;
         if ends.1.0.saturating_sub(ends.0.0) < LEAST_NANOS {

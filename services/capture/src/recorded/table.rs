@@ -1,4 +1,4 @@
-//! Assignment of recorded pictures to common instants.
+//! Assignment of recorded pictures to the frames of a run.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,12 +14,12 @@ use crate::live::Grid;
 
 /// Longest time from taking a picture until it was sent, in nanoseconds. A longer time shows damage.
 const MAX_AGE_NANOS: u64 = 60_000_000_000;
-/// Lowest and highest rate of common instants, in hertz.
+/// Lowest and highest accepted frame rate, in hertz.
 const RATES_HZ: [f64; 2] = [0.01, 10_000.0];
 /// Tolerance for the time of a piece of a stream, which is rounded to milliseconds.
 const SAME_NANOS: i64 = 1_000_000;
 
-/// A picture that belongs to an instant.
+/// A picture that is assigned to a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Picture {
     pub instant: u64,
@@ -58,7 +58,7 @@ pub(super) struct Table {
     pub size: Size,
     pub rate_hz: f64,
     pub grid: Grid,
-    /// Pictures with an instant, by time.
+    /// Pictures that are assigned to a frame, by time.
     pub pictures: Vec<Picture>,
     /// All messages of streams, by number.
     pub parts: Vec<Part>,
@@ -68,7 +68,7 @@ pub(super) struct Table {
 impl Table {
     /// Reads the heads of all pictures of a camera.
     ///
-    /// * `rate_hz`: number of common instants per second; `None` for the instants of the recorded run.
+    /// * `rate_hz`: number of frames per second; `None` for the frame rate of the recorded run.
     pub(super) fn read(
         file: &mut File,
         camera: &str,
@@ -133,7 +133,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Assigns a picture to every instant.
+    /// Assigns a picture to every frame.
     fn place(&mut self, heads: &[(Entry, PictureHeader)]) {
         let is_picture = |picture: &&(Entry, PictureHeader)| {
             let header = &picture.1;
@@ -178,7 +178,7 @@ impl Table {
         self.pictures.last().map_or(0, |picture| picture.instant + 1)
     }
 
-    /// Returns the first picture that is not before an instant.
+    /// Returns the first picture whose frame is not before a given frame.
     pub(super) fn first_at(&self, instant: u64) -> usize {
         self.pictures.partition_point(|picture| picture.instant < instant)
     }
@@ -199,7 +199,7 @@ impl Table {
         nearest.map(|nearest| *nearest.1)
     }
 
-    /// Returns the time of a picture in seconds from the first instant.
+    /// Returns the time of a picture after the first frame, in seconds.
     pub(super) fn seconds(&self, picture: &Picture) -> f64 {
         self.grid.seconds(picture.at_nanos)
     }

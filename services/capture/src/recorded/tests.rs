@@ -16,7 +16,7 @@ const START: u64 = 7_000_000_000;
 
 /// Writes a recording with raw pictures of the camera `left`, each of one brightness.
 ///
-/// * `pictures`: number, milliseconds after the first instant, and brightness of each picture.
+/// * `pictures`: for each picture, its number, its time in milliseconds after the first frame, and its brightness.
 fn recording(pictures: &[(u64, u64, u8)]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("run.mcap");

@@ -82,7 +82,7 @@ pub(crate) fn footage(
     }
 }
 
-/// Returns the footage at common instants.
+/// Returns the footage, resampled at the frame times that all cameras share.
 fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage>, Failure> {
     let capture = &deployment.capture;
     let mut clocks = Vec::new();

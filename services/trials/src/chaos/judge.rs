@@ -100,7 +100,7 @@ pub(super) fn once(
 pub(super) struct RandomKillsOutcome {
     /// Number of kills.
     pub n_kills: usize,
-    /// Downtimes of the processes that came back, in milliseconds; `None` if no process came back.
+    /// Downtimes of the processes that worked again after a kill, in milliseconds; `None` if there are none.
     pub downtime_ms: Option<Spread>,
     /// Resources in use at the start and at the end; `None` if the run was too short.
     pub resources: Option<[ResourceUse; 2]>,

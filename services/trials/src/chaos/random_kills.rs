@@ -58,7 +58,7 @@ impl Kill {
 
 impl RandomKills {
     /// * `period`: the time between two kills, in nanoseconds.
-    /// * `until_frame`: frame whose result ends the kills, so that all processes have time to come back.
+    /// * `until_frame`: frame whose result ends the kills, so that all processes have time to restart.
     pub(super) fn new(seed: u64, period: u64, until_frame: u64) -> Self {
         Self {
             random: Rng::with_seed(seed),

@@ -190,7 +190,7 @@ fn times_translate_there_and_back() {
     assert_eq!(got.ours(0), 0, "before our clock began");
 }
 
-/// Three exchanges over six seconds whose fitted line is far from the line through the first and the last.
+/// Three exchanges over six seconds, for which the fitted line is far from the line through the first and the last exchange.
 #[test]
 fn a_line_that_leaves_its_ends_has_a_bound_that_says_so() {
     let random = Rng::with_seed(10_865_627_331_665_547_518);

@@ -11,7 +11,7 @@ use super::Bench;
 use crate::evaluation::{parse14, part_errors_and_facing, projected, size};
 
 impl Bench {
-    /// Solves every view of an instant alone, and adds the results to the learners.
+    /// Solves every view of a frame on its own, and adds the results to the learners.
     ///
     /// * `joints`: the true joints of the sequence's joint set, in metres.
     /// * `by_name`: true to learn pairs of cameras by name as well.

@@ -16,7 +16,7 @@ const SCENE_BYTES: u64 = 24_000;
 /// Interval between messages to the user about the size of the file.
 const PERIOD: Duration = Duration::from_secs(10);
 
-/// Maximum size of the messages of one instant, over all views, in bytes.
+/// Maximum size of the messages about one frame, over all views, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PerFrame {
     pub pixels: u64,
@@ -86,7 +86,7 @@ pub(super) struct Forecast {
 }
 
 impl Forecast {
-    /// Returns the size of one instant, in bytes.
+    /// Returns the size of the messages about one frame, in bytes.
     fn frame_bytes(&self) -> u64 {
         self.per_frame.bytes(self.without)
     }
