@@ -15,7 +15,7 @@ class Browser:
         to, self.out = os.pipe()
         self.into, back = os.pipe()
         def give():
-            # First duplicates the descriptors to numbers other than 3 and 4.
+            # First duplicates the descriptors to numbers other than 3 and 4, which the browser uses.
             os.dup2(to, 103); os.dup2(back, 104); os.dup2(103, 3); os.dup2(104, 4)
         flags = ["--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run",
                  "--remote-debugging-pipe", f"--user-data-dir={folder}", "--disable-dev-shm-usage"]

@@ -7,7 +7,7 @@ n_cameras, seconds, rate = int(n_cameras), int(seconds), float(rate)
 n_frames = int(seconds * rate)
 SET = os.environ.get("SET", "").split()
 if os.environ.get("FILTERS"):
-    # Light enough for a busy machine: tracked filters on small frames.
+    # These settings are light enough for a busy machine: filters near the last pose, on small frames.
     SET += ["method=paper", "paper.search=tracked", "capture.scale=0.4", "capture.upright=true"]
     if carry == "poses":
         SET.append("paper.views=pairs")
@@ -293,7 +293,7 @@ def endurance(folder, processes):
             file.write(json.dumps(faults[-1]) + "\n")
     rows = [json.loads(it) for it in open(f"{folder}/held.jsonl")]
     rows = [it["held"] for it in rows if it["s"] > 120] or [held_now]
-    # Growth shows as a difference between the first and the last quarter.
+    # Growth is the difference between the last and the first quarter.
     quarter = max(len(rows) // 4, 1)
     total = lambda row, key: sum(it[key] for it in row.values())
     mean = lambda part, key: round(sum(total(it, key) for it in part) / len(part), 1)
@@ -371,7 +371,7 @@ def clear():
 
 def main():
     data = f"{out}/data"
-    # Without keys, for builds and networks that do not use them.
+    # Tests a deployment without keys, for builds and networks that do not use them.
     keys = None if os.environ.get("INSECURE") else f"{out}/keys"
     write(data, keys)
     truth = truth_of(data)

@@ -57,7 +57,7 @@ impl Errors {
     }
 }
 
-/// Returns the rows without any option, with each of the three options alone, and with all of them.
+/// Returns the rows of the table: without any option, with each of the three options alone, and with all options.
 fn rows() -> [(&'static str, Switches); 7] {
     let row = |upright, facing, candidates| Switches {
         upright,

@@ -1,4 +1,4 @@
-//! The job of the process.
+//! The settings of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use deployment::hosts::Carry;
 use crate::address::Address;
 use crate::maps::ViewMaps;
 
-/// The job of the process.
+/// The settings of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Address to connect to or to listen on, with the names and keys of the hosts.
@@ -26,7 +26,7 @@ pub struct Job {
     pub sizes: Vec<[u32; 2]>,
     /// Time from the start of the session to the nominal time of the first frame, in nanoseconds.
     pub lead_nanos: u64,
-    /// Time from the nominal time of a frame to that of the next frame, in nanoseconds.
+    /// Interval between the nominal times of consecutive frames, in nanoseconds.
     pub period_nanos: f64,
     /// The first frame of the footage.
     pub start_frame: u64,

@@ -1,4 +1,4 @@
-//! The job of the process.
+//! The settings of the process.
 
 use core::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::live::LiveJob;
 use deployment::Timeline;
 use deployment::capture::{Faults, Mode, Pace};
 
-/// The job of the process of one camera.
+/// The settings of the process of one camera.
 #[derive(Debug)]
 pub struct Job {
     /// Index of the view.

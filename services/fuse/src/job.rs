@@ -1,4 +1,4 @@
-//! The job of the process.
+//! The settings of the process.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use multiview::ViewPlan;
 use pipeline::{Follow, FuseStep, Views};
 
-/// The job of the process of one worker.
+/// The settings of the process of one worker.
 #[derive(Debug)]
 pub struct Job {
     /// Index of the worker.

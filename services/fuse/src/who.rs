@@ -9,7 +9,7 @@ use pipeline::{Sightings, WhoSettings, WhoStep, time_s};
 use runtime::{Place, Service};
 use stage::{Frame, Stage};
 
-/// The job of the process, for people found by networks.
+/// The settings of the process, for people found by networks.
 #[derive(Debug)]
 pub struct WhoJob {
     /// Cameras of the views, in the rig's order.

@@ -53,7 +53,7 @@ impl JointError {
     }
 }
 
-/// Evaluates a network on people. Each person is shown in the box around the marked joints.
+/// Evaluates a network on people. The input of the network is the box around each person's marked joints, or the detector's box.
 ///
 /// * `stop`: checked before every person.
 /// * `console`: shows every person who was left out, and the progress.

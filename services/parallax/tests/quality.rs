@@ -17,8 +17,8 @@ use viewquality::{Card, ForecastInput, Forecaster, Unit, n_evidence};
 
 const N_PARTS: usize = 26;
 
-/// Returns a network with `sigma` of part `i` = mean red of the tile + `i` / 8 + response of part 1, at least 0. A part is switched off
-/// beyond `tau`.
+/// Returns a network with `sigma` of part `i` = mean red of the tile + `i` / 8 + response of part 1, at least 0. A part is switched off if
+/// its `sigma` exceeds `tau`.
 fn network(tau: f32) -> Network {
     let k = n_evidence(N_PARTS);
     let mut net = Network::default();

@@ -1,4 +1,4 @@
-//! The job of the process.
+//! The settings of the process.
 
 use core::time::Duration;
 
@@ -75,7 +75,7 @@ impl Step {
     }
 }
 
-/// The job of the process of one view.
+/// The settings of the process of one view.
 #[derive(Debug)]
 pub struct Job {
     /// Index of the view.

@@ -12,7 +12,7 @@ use stage::{Context, Stage};
 use viewquality::{ForecastInput, Forecaster, Predictor};
 use wire::WireError;
 
-/// The job of the process of one view.
+/// The settings of the process of one view.
 #[derive(Debug)]
 pub struct Job {
     /// Index of the view.

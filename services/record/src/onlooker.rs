@@ -26,7 +26,7 @@ pub struct Kept {
 /// Writes every message of a deployment until its last result, or until `is_over` returns true. Senders never wait: messages that do not
 /// fit into the queues are missing from the file, and are counted.
 ///
-/// * `bus`: the bus of an onlooker ([`Bus::as_onlooker`]).
+/// * `bus`: the bus of a process that is not part of the deployment ([`Bus::as_onlooker`]).
 /// * `session`: the session of the run.
 /// * `is_over`: returns true to end the recording.
 ///

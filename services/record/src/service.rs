@@ -25,7 +25,7 @@ const LONGEST_WAIT: Duration = Duration::from_mins(1);
 /// Time to wait for the last heartbeats after the last result.
 const LAST_HEARTBEATS: Duration = Duration::from_millis(500);
 
-/// The job of the process.
+/// The settings of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Path of the recording.
@@ -119,7 +119,8 @@ fn rest(service: &Service, waiter: &Waiter, receivers: &[Receiver]) -> Result<()
 
 /// Receives all messages, and puts them into the queue.
 pub(crate) struct Recorder<'a> {
-    /// The process of the recorder; `None` for an onlooker, for which senders do not wait.
+    /// The process of the recorder; `None` for an onlooker (an observing process that is not part of the deployment), for which senders do
+    /// not wait.
     service: Option<&'a Service>,
     /// Session of the recorded run.
     pub(crate) session: u64,

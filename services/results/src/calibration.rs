@@ -58,8 +58,8 @@ impl Calibration {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
             fit.without_px = self.watch.without_px(view).map(|value| value * scale);
-            // If the footage of two cameras was swapped, every camera contradicts the calibration. So does a camera whose pictures are
-            // late, while a person walks. A camera that was moved does not look late.
+            // If the footage of two cameras was swapped, every camera contradicts the calibration. While a person walks, a camera whose
+            // pictures are late also contradicts it. A camera that was moved does not look late.
             let is_named =
                 self.watch.is_reported(view) && self.exchanged.is_none() && !fit.out_of_step;
             if is_named && !fit.suspected {

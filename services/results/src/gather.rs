@@ -13,7 +13,7 @@ const MAX_FRAMES: usize = 512;
 /// Maximum number of consecutive frames without a result (hours of footage). A result further ahead has a wrong frame number.
 const MAX_ABSENT: u64 = 1 << 20;
 
-/// Maximum number of pairs of a frame.
+/// Maximum number of pairs of views in a frame.
 const MAX_PAIRS: usize = MAX_VIEWS * (MAX_VIEWS - 1) / 2;
 
 /// The messages about frames whose results have not been received yet.

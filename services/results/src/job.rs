@@ -1,4 +1,4 @@
-//! The job of the process.
+//! The settings of the process.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use deployment::results::Config;
 
 use crate::Scene;
 
-/// The job of the process.
+/// The settings of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Names and geometry to which messages refer by number.

@@ -1,4 +1,4 @@
-//! `pose3d.jsonl` and `pose3d.csv`: joints in the world.
+//! `pose3d.jsonl` and `pose3d.csv`: joints in world coordinates.
 
 use std::collections::BTreeMap;
 

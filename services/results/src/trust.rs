@@ -32,7 +32,7 @@ pub(crate) struct Trusted {
     n_unsure: u64,
     n_joints: u64,
     n_joints_implausible: u64,
-    /// Number of bodies by their deviation, in units of [`STEP`].
+    /// For each deviation, in units of [`STEP`], the number of bodies with this deviation.
     deviations: BTreeMap<u32, u64>,
     /// Sum of the squared errors, as fractions of the person's height, and number of errors.
     squared: (f64, u64),

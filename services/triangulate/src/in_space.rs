@@ -15,7 +15,7 @@ use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Stage};
 use wire::SolvedPerson;
 
-/// The job of the process, for people found by networks.
+/// The settings of the process, for people found by networks.
 #[derive(Debug)]
 pub struct SpaceJob {
     /// The views of the rig.

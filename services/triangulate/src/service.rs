@@ -15,7 +15,7 @@ use wire::{SolvedPerson, WireError};
 /// Identity that is reported for the followed person. The paper's method follows only one person, and has no identities.
 const UNNAMED: u64 = 1;
 
-/// The job of the process.
+/// The settings of the process.
 #[derive(Debug)]
 pub struct Job {
     /// The views of the rig.

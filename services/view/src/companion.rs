@@ -1,4 +1,4 @@
-//! A view beside a run: a separate process that ends with the run, and is restarted if it dies.
+//! The web page of a run, served by a separate process (`parallax view`). The process ends with the run, and is restarted if it dies.
 
 use core::net::SocketAddr;
 use core::time::Duration;
@@ -14,14 +14,14 @@ use failure::{ExitKind, Failure, OrFail as _};
 
 use crate::options::Listen;
 
-/// Pause before a view that died is restarted.
+/// Pause before a view process that died is restarted.
 const PAUSE: Duration = Duration::from_millis(500);
 /// Time between two checks of the process.
 const TURN: Duration = Duration::from_millis(100);
 /// Largest number of starts.
 const MOST_STARTS: u32 = 100;
 
-/// A view beside a run. The view ends when this value is dropped, and also when this process ends in any other way.
+/// The process that serves the web page of a run. It ends when this value is dropped, and also when this process ends in any other way.
 #[derive(Debug)]
 pub struct Companion {
     over: Arc<AtomicBool>,

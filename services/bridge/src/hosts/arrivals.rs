@@ -11,7 +11,7 @@ const SLACK: f64 = 0.1;
 pub struct Grid {
     /// Time of the first frame, in nanoseconds.
     pub start_nanos: u64,
-    /// Time from the nominal time of a frame to that of the next frame, in nanoseconds.
+    /// Interval between the nominal times of consecutive frames, in nanoseconds.
     pub period_nanos: f64,
 }
 

@@ -292,7 +292,8 @@ fn fusion(weights: &Weights) -> multiview::Settings {
     }
 }
 
-/// Returns the root mean square error of the joints of held-out people for each ridge; the first entry is without a map.
+/// Returns the root mean square error of the joints of held-out people for each ridge parameter. The first entry is the error without a
+/// map.
 fn joint_errors(learner: &Learner, other: &Learner) -> Vec<(Option<f64>, f64)> {
     let theirs = other.joints();
     let none = multiview::learned::JointFit::default();

@@ -191,7 +191,7 @@ fn selection(option: &str, values: &[&str]) -> Result<Option<Selection>, Failure
     }
 }
 
-/// Returns the angles of copies without duplicates, 0 first.
+/// Returns the angles of the rotated copies, without duplicates and starting with 0.
 fn degrees(values: &[&str]) -> Result<Vec<f64>, Failure> {
     let mut angles = vec![0.0];
     for text in values.iter().flat_map(|value| value.split(',')) {

@@ -95,7 +95,8 @@ pub(crate) fn finish(companion: Option<Companion>, quiet: bool) {
     }
 }
 
-/// Starts publishing beside a run of a deployment, for the option `--publish`. Returns `None` if there are no targets.
+/// Starts a separate process that publishes the skeletons of a deployment's run, for the option `--publish`. Returns `None` if there are no
+/// targets.
 ///
 /// * `name`: name of the deployment.
 /// * `beyond`: true to allow targets on other machines.

@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     Ok(ExitCode::SUCCESS)
 }
 
-/// Starts a view beside a run of a deployment, for the option `--view`.
+/// Starts the web page of a deployment's run in a separate process, for the option `--view`.
 ///
 /// * `name`: name of the deployment.
 pub(crate) fn beside(name: &str) -> Result<view::Companion, Failure> {

@@ -11,7 +11,7 @@ input = { width = 64, height = 64, scale = 0.00392156862745098 }
 output = { codec = "list", boxes = "dets" }
 "#;
 
-/// Returns the sides of a port.
+/// Returns the dimensions of a network's input or output.
 pub(crate) fn sides(n: [usize; 4]) -> Vec<Side> {
     n.map(Side::Fixed).to_vec()
 }

@@ -1,11 +1,11 @@
-//! The job of the process.
+//! The settings of the process.
 
 use core::time::Duration;
 use std::path::PathBuf;
 
 use crate::replay::Pace;
 
-/// The job of the process.
+/// The settings of the process.
 #[derive(Debug)]
 pub struct Job {
     /// Path of the recording.

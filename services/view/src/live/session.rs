@@ -1,4 +1,4 @@
-//! One run of a deployment, seen by an onlooker.
+//! One run of a deployment, as seen by an observer that is not part of it.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub(crate) enum Look {
     Over,
 }
 
-/// An onlooker of one run.
+/// An observer of one run.
 #[derive(Debug)]
 pub(crate) struct Session {
     scene: Arc<Scene>,
@@ -68,7 +68,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// Fails if the deployment is not running or has too many onlookers, or if its model or calibration cannot be read.
+    /// Fails if the deployment is not running or has too many observers, or if its model or calibration cannot be read.
     pub(crate) fn open(
         named: Option<&str>,
         pictures_per_second: u32,
