@@ -1,6 +1,6 @@
 //! A hundred images of the PARSE test set, compared with the detections of Yang & Ramanan's program.
 //!
-//! With another JPEG decoder (`image` 0.25), the PCP is 69.8 and 22 detections are the same.
+//! With another JPEG decoder (`image` 0.25), PCP is 69.8 %, and only 22 detections are the same as with that program.
 
 use std::sync::Arc;
 

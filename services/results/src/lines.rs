@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{self, Write as _};
 
-/// A file that grows by complete lines, even if the disk becomes full.
+/// A file to which only complete lines are appended, even if the disk becomes full.
 #[derive(Debug)]
 pub(crate) struct Lines {
     file: File,

@@ -33,7 +33,7 @@ impl Stall {
         let watched = Arc::new(Watched::default());
         let (end, ended) = sync_channel(0);
         let seen = Arc::clone(&watched);
-        // A stopped process sleeps through many ticks, but counts only one.
+        // While a process is stopped, many ticks pass, but it counts only one of them.
         let tick = limit / 60;
         thread::Builder::new().name("stall".to_owned()).spawn(move || {
             let (mut turns, mut waited) = (0, Duration::ZERO);

@@ -22,9 +22,9 @@ pub struct Pictures {
 /// Kind of detection to evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Judged {
-    /// The best detection in the picture, as for published PCP.
+    /// The best detection in the picture, which published values of PCP use.
     Best,
-    /// The best detection that covers the person, as for published PCK.
+    /// The best detection that covers the person, which published values of PCK use.
     OnPerson,
 }
 

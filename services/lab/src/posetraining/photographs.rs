@@ -201,7 +201,7 @@ fn front(marks: &Marks, across: f32, lean: f32) -> [f32; 3] {
     }
 }
 
-/// Rotates a direction relative to an upright trunk into the picture with the leaning trunk.
+/// Converts a direction relative to an upright trunk to a direction in the picture, in which the trunk leans.
 fn in_picture([aside, towards]: [f32; 2], lean: f32) -> [f32; 3] {
     let aside = if aside.is_finite() { aside } else { 0.0 };
     let towards = if towards.is_finite() { towards } else { 0.0 };

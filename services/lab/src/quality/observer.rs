@@ -23,7 +23,7 @@ pub(super) enum NoSample {
     /// A true joint is unknown.
     #[error("the true position of a joint is unknown")]
     Unknown,
-    /// The model has another number of parts.
+    /// The model does not have 26 parts.
     #[error("the model does not have 26 parts")]
     Model,
     /// The evidence cannot be written.

@@ -27,7 +27,7 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    /// Starts to show the progress, with no frame done.
+    /// Starts to show the progress, before any frame is done.
     pub fn new(resolved: &Resolved, quiet: bool) -> Self {
         let n_frames = (!resolved.is_endless()).then(|| resolved.n_frames());
         let bar = if quiet || !output::is_terminal() {
