@@ -113,10 +113,10 @@ fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached()
     let [.., mean, consensus, at_once] = &reached[..] else {
         panic!("three rows with everything switched on")
     };
-    // Median and 90th percentile of the errors reached so far, in cm: by the mean, 6.4 and 20.5 in upright frames, 15.0 and 85.9 in bent
-    // frames; by consensus, 6.5 and 25.2, 12.8 and 83.7; with all views at once, 6.4 and 15.7, 11.0 and 95.4. The goals are 7 and 15 in
-    // upright frames, and 17 and 50 in bent frames. In the upright frames, large errors are caused by crossed legs and raised wrists. In
-    // the bent frames, they are caused by swapped sides, and by poses that differ from the training data.
+    // Median and 90th percentile of the errors reached so far, in cm. In upright frames: 6.4 and 20.5 by the mean, 6.5 and 25.2 by
+    // consensus, 6.4 and 15.7 with all views at once (goal: 7 and 15). In bent frames: 15.0 and 85.9 by the mean, 12.8 and 83.7 by
+    // consensus, 11.0 and 95.4 with all views at once (goal: 17 and 50). In the upright frames, large errors are caused by crossed legs and
+    // raised wrists. In the bent frames, they are caused by swapped sides, and by poses that differ from the training data.
     for ([upright, bent], [upright_cm, bent_cm]) in [
         (mean, [7.5, 16.0]),
         (consensus, [8.0, 14.0]),

@@ -50,7 +50,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
     }
 }
 
-/// PCP by the mean of both ends, and by both ends separately, from `configs/models/person.md`.
+/// PCP in percent, by the mean error of both ends of a segment and by the error of each end, from `configs/models/person.md`.
 const CARD: [f64; 2] = [73.3, 67.4];
 
 #[test]

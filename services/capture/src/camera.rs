@@ -40,7 +40,8 @@ pub(crate) struct Camera<'a> {
     pacer: Pacer,
     place: Place,
     n_dropped: u64,
-    /// Number of receivers that the camera waits for. It is lower than in the job if some receivers did not connect in time.
+    /// Number of receivers that the camera waits for. It is lower than the number in the settings if some receivers did not connect in
+    /// time.
     n_expected: usize,
     /// Reason why the last frame had no picture, if it had none.
     trouble: Option<Status>,

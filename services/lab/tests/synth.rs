@@ -21,7 +21,7 @@ fn synth(case: &Case, arguments: &[&str]) -> Ended {
     case.start(&all).wait()
 }
 
-/// Options for two cameras, three frames, and the planted model.
+/// Options for two cameras, three frames, and the small test model.
 const SMALL: [&str; 8] = [
     "--rig",
     "ring:2",
@@ -33,7 +33,7 @@ const SMALL: [&str; 8] = [
     "10",
 ];
 
-/// Runs a written deployment with small frames, and returns its 2D results.
+/// Runs a deployment that `synth` has written, with small frames, and returns its 2D results.
 fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
     let file = format!("{folder}/deployment.toml");
     case.edit(&file, "synth-s1-walking-1", &case.name);
@@ -57,7 +57,7 @@ fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let (ended, from_files) = run(&case, "files", &[]);
-    // The planted model finds no person in rendered pictures, so the run is degraded. Only the bits of the results are compared.
+    // The small test model finds no person in rendered pictures, so the run is degraded. Only the bits of the results are compared.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert_eq!(from_files.lines().count(), 6, "three frames of two views");
 

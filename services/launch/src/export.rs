@@ -101,14 +101,14 @@ impl Written {
 /// Ending of the file that describes the exported files, such as `pose3d.export.json`.
 const MANIFEST: &str = ".export.json";
 
-/// Writes a run in all formats of a job.
+/// Writes a run in all formats that a job requests.
 ///
 /// All checks come before anything is written. Each file gets its final name when it is complete.
 ///
 /// # Errors
 ///
-/// Fails if a format needs data that the run lacks, a file exists and must not be replaced, or the disk fails. Fails with `Interrupted`
-/// on a stop request. Files that are complete by then are kept.
+/// Fails if a format needs data that the run lacks, a file exists and must not be replaced, or the disk fails. Fails with `Interrupted` on
+/// a stop request. Files that are complete by then are kept.
 pub fn export(
     origin: &Origin,
     job: &Job,
@@ -275,7 +275,7 @@ fn file(trial: &Trial, format: &'static FileFormat, path: &Path) -> Result<Writt
         path: path.to_owned(),
         about: [format.unit, format.axes, format.gaps, format.uncertainty],
         notes: notes.map_err(|error| match error.kind() {
-            // The format cannot hold the data, so the disk is not at fault.
+            // This error means that the format cannot represent the data, not that the disk failed.
             io::ErrorKind::InvalidInput => Failure::new(ExitKind::Degraded, error),
             _ => cannot_write(path, &error),
         })?,

@@ -31,7 +31,7 @@ pub struct Part {
     pub seconds: Option<f64>,
 }
 
-/// Whether the poses of the cameras are known.
+/// Knowledge of the poses of the cameras: known from the rig, or unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Poses {
     /// The poses in the rig are right. Pictures are turned upright before people are searched in them, as in a run.

@@ -1,5 +1,5 @@
 //! Deployments of several hosts: chooses the host of this machine, computes the fingerprint that all hosts must share, and prepares the
-//! job of the bridge.
+//! settings of the bridge.
 
 use std::path::{Path, PathBuf};
 
@@ -177,7 +177,7 @@ pub(crate) fn namespace(resolved: &Resolved) -> String {
     }
 }
 
-/// Returns the job of the bridge.
+/// Returns the settings of the bridge.
 pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
     let deployment = &resolved.deployment;
     let host = resolved

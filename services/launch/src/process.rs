@@ -1,4 +1,4 @@
-//! Runs one process of a deployment: creates the job of its service from the resolved deployment.
+//! Runs one process of a deployment: creates the settings of its service from the resolved deployment.
 
 mod live;
 pub(crate) mod view_step;

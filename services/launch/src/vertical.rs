@@ -150,8 +150,8 @@ fn reason(best: &Hypothesis, tried: &[Hypothesis], cameras: &[Camera]) -> String
     )
 }
 
-/// Returns the directions to try, in this order: the upward direction if the cameras are level, those for cameras rolled by 90 degrees to
-/// either side, the world axes, and the opposite of the first direction.
+/// Returns the directions to try, in this order: the direction that is up if the cameras are level, the two directions that are up if the
+/// cameras are rolled by 90 degrees, the world axes, and the opposite of the first direction.
 fn directions(cameras: &[Camera]) -> Vec<UnitVector3<f64>> {
     let axis =
         |camera: &Camera, axis: Vector3<f64>| camera.camera_from_world.rotation.inverse() * axis;

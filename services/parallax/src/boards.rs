@@ -109,7 +109,7 @@ pub struct Looked {
     pub note: Option<String>,
     /// Corner points of the board, in metres.
     pub layout: Layout,
-    /// Sights of each camera.
+    /// Sights of the board by each camera.
     pub cameras: Vec<Seen>,
 }
 

@@ -1,4 +1,4 @@
-//! The computations behind the commands that read files and write files, for rigs and finished runs.
+//! The computations of those commands that process the files of rigs and finished runs.
 #![forbid(unsafe_code)]
 
 pub mod boards;

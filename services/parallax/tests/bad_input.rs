@@ -317,7 +317,7 @@ fn every_pixel_format_works() {
     assert_eq!(found[4], found[0], "sixteen bits");
 }
 
-/// Returns a planted picture with another size.
+/// Returns a test picture with another size.
 fn picture(width: u32, height: u32) -> DynamicImage {
     let [w, h] = planted::SIZE;
     let canvas = planted::picture(&planted::rig(2).cameras()[0], 0);

@@ -1,4 +1,4 @@
-//! Tests with photographs and clips as users have them: large, with an orientation tag, some damaged.
+//! Tests with photographs and clips like those of users: some are large, some have an orientation tag, and some are damaged.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 

@@ -6,7 +6,7 @@ fn case(name: &str, device: &str) -> Case {
     let case = Case::new(name, &[2; 2], PLAIN);
     let both = format!("method = \"paper\"\ndevice = \"{device}\"");
     case.edit("deployment.toml", "method = \"paper\"", &both);
-    // The planted model shares filters between parts, and the GPU does not support this.
+    // The test model shares filters between parts, which is not supported on the GPU.
     case.edit("deployment.toml", "model = \"model.plx\"\n", "");
     case
 }

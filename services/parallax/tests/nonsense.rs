@@ -222,7 +222,7 @@ fn footage_of_another_camera_is_refused_or_reported() {
     ]);
 }
 
-/// Writes a video of a test pattern with the size of the planted pictures.
+/// Writes a video of a test pattern that has the size of the test pictures.
 fn video(case: &Case, name: &str, rate: &str, pattern: &str) {
     let source = format!("{pattern}=s=96x128:r={rate}:d=2");
     let done = std::process::Command::new("ffmpeg")
@@ -308,7 +308,7 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     case.edit("deployment.toml", "upright = false", "upright = true");
     let ended = case.start(CHECK).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    // The planted figure looks like a person in any direction, so only the messages are checked.
+    // The test figure looks like a person in any direction, so only the messages are checked.
     for said in [
         "the calibration does not give the upward direction; up = [",
         "people are found with a score of",

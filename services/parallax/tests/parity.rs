@@ -24,7 +24,7 @@ fn turned_resized_and_distorted_frames() {
     let more = "[capture]\nsize = [120, 140]\n[results]\noverlay_every = 0\n";
     let case = Case::with_rig(&rig, "warped", &[20; 3], more);
     let ended = case.run();
-    // The planted figure is only eight pixels high here, so the verdict is doubtful. Only the bits are compared.
+    // The test figure is only eight pixels high in these frames, so the verdict is "doubtful". Only the bits are compared.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let one = OneProcess {
         upright_size: Some([120, 140]),

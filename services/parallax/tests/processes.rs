@@ -37,8 +37,8 @@ fn an_interrupted_run_ends_cleanly() {
 
 #[test]
 fn signals_to_all_processes_at_once_end_the_run_in_order() {
-    // Signals as they are sent by systemd to a unit (to all processes, in any group), by `timeout` to a command (twice), and by a closing
-    // terminal to its processes (twice).
+    // Sends signals in three ways: like systemd, to all processes of any group; like `timeout`, twice to the command; like a terminal that
+    // is closed, twice to its processes.
     for (name, signals, to_all) in [
         ("unit", &["TERM"][..], true),
         ("timeout", &["TERM", "TERM"], false),

@@ -240,7 +240,7 @@ mod long {
     use std::path::Path;
     use std::process::Command;
 
-    /// Returns true if a Python installation has everything that its tests need.
+    /// Returns true if a Python installation has everything that the Python tests need.
     fn is_able(python: &str) -> bool {
         let imports = Command::new(python).args(["-c", "import iceoryx2, numpy, pytest"]).output();
         imports.is_ok_and(|import| import.status.success())

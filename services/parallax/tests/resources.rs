@@ -27,8 +27,8 @@ fn assert_no_bus_error(ended: &Ended) {
 fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal() {
     let more = PLAIN.to_owned() + "[supervise]\nmax_restarts = 2\ndeadline_ms = 2000\n";
     let case = Case::new("filling", &[20; 3], &more);
-    // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the
-    // next run. This is done five times, and then repeated until the process was early enough once.
+    // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the next run. This
+    // is done five times, and then repeated until the process was fast enough at least once.
     let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
         n=0\n\
         for wait in 0 1 3 5 8 0 2 0 4 0 6 0 1 0 3 0 5 0 8 0; do\n\
@@ -295,7 +295,8 @@ mod long {
         assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-        // The killed process frees memory, so the next process may fail at different places: the queues, a topic or its wake-up is refused.
+        // The killed process frees memory, so the next process may fail at different steps: when it requests its queues, a topic, or the
+        // wake-up of a topic.
         for words in [
             "of shared memory",
             "free in /dev/shm",

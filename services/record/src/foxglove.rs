@@ -1,4 +1,5 @@
-//! Messages for Foxglove, in its own message types as JSON, besides Parallax's messages. With them, Foxglove can show a recording directly.
+//! Messages in Foxglove's own message types, as JSON, which are recorded in addition to Parallax's messages. With them, Foxglove can show a
+//! recording directly.
 //!
 //! The schemas (`foxglove/`) are those of `@foxglove/schemas` 2.1.0, without descriptions (MIT licence).
 

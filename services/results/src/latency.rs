@@ -13,9 +13,9 @@ const LONGEST_MICROS: u64 = 3_600_000_000;
 
 /// Collects durations frame by frame.
 ///
-/// Each hop has two parts. Waiting is the time in which the receiver was still busy: it sent its previous message after this message was
-/// sent. The rest of the hop is transport. The path of a frame is followed backwards from the result: to the pair of views that was
-/// received last, then to the view whose pose was received last.
+/// Each hop (the way of a message from one process to the next) has two parts. Waiting is the time in which the receiver was still busy: it
+/// sent its previous message after this message was sent. The rest of the hop is transport. The path of a frame is followed backwards from
+/// the result: to the pair of views that was received last, then to the view whose pose was received last.
 #[derive(Debug)]
 pub struct Latency {
     histograms: BTreeMap<(Kind, &'static str), Histogram<u32>>,

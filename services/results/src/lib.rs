@@ -1,7 +1,7 @@
 //! Writes the output files of a deployment.
 //!
-//! Reading order: [`Scene`] (the meaning of the numbers in messages), [`FrameRecord`] (all messages about
-//! one frame), the writers of one format each, and [`Output`], which combines them.
+//! Reading order: [`Scene`] (the meaning of the numbers in messages), [`FrameRecord`] (all messages about one frame), one writer for each
+//! format, and [`Output`], which combines the writers.
 #![forbid(unsafe_code)]
 
 mod scene;

@@ -7,7 +7,7 @@ use crate::overlay::joints_of;
 use crate::pose3d::is_placed;
 use crate::{FrameRecord, Scene};
 
-/// Maximum distance of a view's median joint from the result, in metres, if the view shows the same person.
+/// Median distance of a view's joints from the result up to which the view counts as showing the same person, in metres.
 const SAME_PERSON_M: f64 = 0.25;
 /// Maximum distance of a joint that is counted, in metres. Larger distances count as this value.
 const MOST_M: f64 = 0.3;
@@ -166,7 +166,7 @@ mod tests {
         let framing = geometry::Framing::new(&aside, [80, 60], None, whole, 0.0).unwrap();
         scene.views[2].framing = framing;
         assert_eq!(distances_m(&scene, &record).len(), 2);
-        // If two views disagree, it is not known which one is right. Both count, and their errors are limited.
+        // If two views disagree, it is not known which view is right. Both count, and their errors are limited.
         record.views[0].pose = None;
         let both = distances_m(&scene, &record);
         assert!(

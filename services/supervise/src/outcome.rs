@@ -12,7 +12,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Returns true if a process was given up, or had not finished when all others had.
+    /// Returns true if a process was given up, or had not finished when all other processes had.
     pub fn is_degraded(&self) -> bool {
         self.processes.iter().any(|process| match process.state {
             State::GivenUp => true,

@@ -120,7 +120,7 @@ pub fn run(
     let stall = Stall::watch(LONGEST_STALL, || failure::end_process(STALLED))
         .map_err(SuperviseError::Watch)?;
     let on_event = &mut |event: Event<'_>| stall.outside(|| on_event(event));
-    // These are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
+    // These values are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
     let lock = plan.namespace.acquire()?;
     preflight(&plan.topics)?;
     let bus = Bus::open(&plan.namespace, SUPERVISOR, stop)?;

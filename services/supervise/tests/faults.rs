@@ -277,7 +277,7 @@ fn a_long_computation_is_awaited() {
             ("source", "send 3 1 1", Role::Essential),
         ],
     );
-    // One process fails, others finish, and one computes for longer than the idle limit.
+    // One process fails, some processes finish, and one process computes for longer than the idle limit.
     case.plan.policy.max_restarts = 0;
     let run = case.run(|_, _| {});
     assert_eq!(run.deaths("thinker"), []);

@@ -359,7 +359,7 @@ pub fn scene_text(input: &[u8]) {
     }
 }
 
-/// Every export format either writes the lines of a run, or refuses them.
+/// Checks that every export format either writes the lines of a run, or refuses them.
 fn exported(input: &str) {
     let mut all = Gathering::default();
     for line in runfiles::lines::<FrameLine>(input).flatten().take(20) {
@@ -373,7 +373,7 @@ fn exported(input: &str) {
     trials.iter().for_each(written);
 }
 
-/// Every single-file format either writes a trial, or refuses it.
+/// Checks that every single-file format either writes a trial, or refuses it.
 fn written(trial: &Trial) {
     // Frames may be very far apart; the slots between them are empty.
     for format in FILES.iter().filter(|_| trial.slots.len() < 1000) {

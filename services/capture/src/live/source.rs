@@ -193,7 +193,7 @@ impl Keeper {
             };
             let Some(error) = failed else { return };
             let status = error.status();
-            // Whether the camera sends a boundary before its first picture can only be found out by trying.
+            // It is only known after an attempt if the camera sends a boundary before its first picture.
             let is_tried = self.camera.is_http() && n_read == 0;
             is_bare ^= is_tried;
             if is_tried && is_bare && said.is_none() {

@@ -80,7 +80,7 @@ impl Pictures {
         offsets(self.pairs(Judged::OnPerson), bootstrap)
     }
 
-    /// Returns the tables of the data set: PCP and PCK of both kinds of detection, in percent.
+    /// Returns the tables of the data set, with PCP and PCK of both kinds of detection, in percent.
     pub fn tables(&self, bootstrap: &Bootstrap) -> Vec<Table> {
         tables(self, bootstrap)
     }

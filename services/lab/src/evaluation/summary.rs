@@ -316,7 +316,7 @@ fn changes(before: &[&FrameScore], after: &[&FrameScore]) -> ChangesOf {
 mod tests {
     use super::*;
 
-    /// Returns a frame in which the first `n_right` of twelve segments are within the threshold; the others exceed the threshold by half.
+    /// Returns a frame in which the first `n_right` of twelve segments are within the threshold, and all other segments exceed it by half.
     fn frame(n_right: usize) -> FrameScore {
         let error = |nth: usize| Some(if nth < n_right { 0.25 } else { 0.75 });
         let truth = [[5.0, 5.0]; 14];

@@ -261,7 +261,8 @@ fn detections(path: &Path, camera: &Camera) -> Result<Vec<View>, ShelfError> {
     Ok(frames)
 }
 
-/// Groups candidates into people: the strongest field first, with one candidate of a keypoint for each person.
+/// Groups candidates into people, beginning with the strongest field between two candidates. Each person has at most one candidate for each
+/// keypoint.
 fn grouped(candidates: &[Candidates], fields: &[Vec<f64>]) -> View {
     struct Edge {
         strength: f64,

@@ -5,7 +5,7 @@ use scene::{Address, skew_ms_of};
 
 use crate::resolved::Resolved;
 
-/// Returns the job of a view's live camera, if the view has one.
+/// Returns the settings of a view's live camera, if the view has one.
 pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> {
     let entry = &resolved.deployment.cameras[view];
     let mut camera = crate::cameras::live_camera(entry)?;

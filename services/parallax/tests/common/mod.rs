@@ -28,8 +28,8 @@ pub(crate) const PLAIN: &str =
 pub(crate) const PACED: &str = "[capture]\nupright = false\nmode = \"paced\"\n\
      frame_rate_hz = 20\n[results]\noverlay_every = 0\n[paper]\nworkers = 2\n";
 
-/// Returns the last line of a frame that every view used. On a loaded machine, a view uses every second or fourth frame and drops the
-/// others.
+/// Returns the last line of a frame that every view used. On a loaded machine, a view uses every second or fourth frame, and drops all
+/// other frames.
 pub(crate) fn last_taken(lines: &[Value]) -> &Value {
     let is_taken = |value: &&Value| {
         let mut missing = value["views_missing"].as_object().unwrap().values();
@@ -78,7 +78,7 @@ impl Case {
             let name = &camera.name;
             writeln!(text, "\n[[camera]]\nname = {name:?}\nsource = {name:?}").unwrap();
         }
-        // The bones of the planted figure do not have human proportions.
+        // The bones of the test figure do not have human proportions.
         let own = "[paper]\nmodel = \"model.plx\"\nbodies = false";
         let more = if more.contains("[paper]") {
             more.replace("[paper]", own)

@@ -64,7 +64,7 @@ pub(super) fn measure(series: &Series, stop: &Stop) -> Result<Option<Measured>, 
     );
     let [health, metrics] = process_topics(RECEIVER);
     let topics = [pixels, health, metrics];
-    // These are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
+    // These values are dropped in reverse order: ports, topics, bus, and finally the lock, which removes all files.
     let lock = namespace.acquire()?;
     preflight(&topics)?;
     let bus = Bus::open(lock.namespace(), "sender", stop)?;

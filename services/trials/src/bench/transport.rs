@@ -1,4 +1,4 @@
-//! Measures one hop between two processes, with a receiver that either is woken by an event or polls.
+//! Measures one hop (the transfer of a message from one process to another), with a receiver that either is woken by an event or polls.
 
 use std::time::Duration;
 

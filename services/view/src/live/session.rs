@@ -23,7 +23,7 @@ const STATE_PERIOD: Duration = Duration::from_millis(500);
 /// Longest pause between two checks of the cameras while there is no result.
 const PATIENCE: Duration = Duration::from_millis(90);
 
-/// Whether the deployment is still running.
+/// State of the deployment: still running, or over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Look {
     /// The deployment still runs.

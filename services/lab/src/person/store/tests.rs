@@ -11,7 +11,7 @@ use super::*;
 /// Number of bytes before the payload of a checkpoint.
 const HEADER: usize = 28;
 
-/// Largest size of the stamp and the fingerprint: two numbers, each with one byte and up to eight more.
+/// Largest size of the stamp and the fingerprint: two numbers, each of which takes up to nine bytes.
 const WHOSE: usize = 18;
 
 struct Noise;

@@ -42,7 +42,7 @@ fn the_calibration_tells_whether_a_tag_is_to_be_followed() {
     for degrees in [90, 270] {
         assert!(turns(rig([480, 640], 0.0, up), [640, 480], degrees));
         assert!(!turns(rig([640, 480], 0.0, up), [640, 480], degrees));
-        // If the calibrated picture is cropped or has another size, its aspect ratio decides.
+        // If the calibrated picture is cropped or has another size, its aspect ratio shows if it was rotated.
         assert!(turns(rig([480, 600], 0.0, up), [640, 480], degrees));
         assert!(turns(rig([480, 480], 0.0, up), [480, 480], degrees));
         assert!(!turns(rig([480, 480], 90.0, up), [480, 480], degrees));

@@ -1,4 +1,4 @@
-//! `parallax bench transport`: measures one hop between two processes.
+//! `parallax bench transport`: measures the transfer of messages from one process to another.
 
 use clap::Args;
 use trials::bench::Transport;

@@ -76,7 +76,7 @@ impl PerFrame {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Forecast {
     pub per_frame: PerFrame,
-    /// Whether pixels are left out, and whether evidence is left out.
+    /// Flags for the parts that are left out: pixels, and evidence.
     pub without: [bool; 2],
     /// Number of frames; `None` for a run without an end.
     pub n_frames: Option<u64>,
