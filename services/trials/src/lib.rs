@@ -2,7 +2,7 @@
 //!
 //! | trial | what it runs | what it checks |
 //! |---|---|---|
-//! | [`chaos`] | a deployment in which a process is killed, stopped or put into an endless loop, or a camera fails or was moved | detection, recovery and losses |
+//! | [`chaos`] | a process is killed, stopped or hangs in an endless loop; a camera fails, or was moved | detection, recovery and losses |
 //! | [`mod@bench`] | messages between two processes; deployments under load | latency and throughput |
 //! | [`demo`] | synthetic cameras, one of which is killed | accuracy of the results, recovery and losses |
 //!
