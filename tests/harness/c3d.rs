@@ -31,7 +31,7 @@ pub struct Trial {
 
 /// Returns the bytes of the file.
 ///
-/// * `integer_scale`: units per step of the integers; `None` to write reals.
+/// * `integer_scale`: size of an integer step, in the unit of the positions; `None` to write floating-point numbers.
 ///
 /// # Panics
 ///

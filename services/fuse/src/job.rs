@@ -15,7 +15,8 @@ pub struct Job {
     pub views: Views,
     /// Choice of the followed person.
     pub follow: Follow,
-    /// Pairs of this worker: index in the deployment, and the two views. If all views are solved at once, these are the views of the pairs.
+    /// The pairs of views of this worker: index of the pair in the deployment, and the two views. If all views are solved at once, these
+    /// are the views of the pairs.
     pub pairs: Vec<(usize, [usize; 2])>,
     /// The fusion step.
     pub step: Arc<FuseStep>,

@@ -1,4 +1,4 @@
-//! Solves one worker's pairs, or all views at once, and sends the poses.
+//! Solves one worker's pairs of views, or all views at once, and sends the poses.
 
 use std::cell::Ref;
 

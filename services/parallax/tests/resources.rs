@@ -1,5 +1,5 @@
-//! Tests of runs without enough shared memory, file descriptors or a free name; and of leftovers of other users. Also tests that no network
-//! sockets are open.
+//! Tests of runs for which there is not enough shared memory, not enough file descriptors, or no free name, and of leftovers of other
+//! users. Also tests that no network sockets are open.
 #![expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 
 use crate::common;

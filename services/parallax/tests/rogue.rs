@@ -276,7 +276,7 @@ fn invalid_poses_and_evidence_are_refused() {
         send_wrong_evidence(&evidence, (stamp, timing));
         pause();
     }
-    // This is a valid stamp of a frame that may be due, with wrong content.
+    // The stamp is valid, and its frame may be due, but the content is wrong.
     let next = case.lines("pose3d.jsonl").len() as u64;
     for frame in next..next + 24 {
         poses.send(&with_wrong_content(good(frame))).unwrap();

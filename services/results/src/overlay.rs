@@ -194,7 +194,8 @@ mod tests {
         let (with, without) = (pixels(&with), pixels(&without));
         let changed: Vec<usize> = (0..with.len()).filter(|&i| with[i] != without[i]).collect();
         assert!(!changed.is_empty());
-        // A pixel of the frame is two pixels of the footage, whose centre is (79.5, 59.5). The point is 4 m away.
+        // A pixel of the frame covers two by two pixels of the footage. The centre of the footage is at (79.5, 59.5). The point is 4 m
+        // away.
         for it in changed {
             let (x, y) = ((it % 80) as f64, (it / 80) as f64);
             let off = (x - 41.5).hypot(y - 31.5);

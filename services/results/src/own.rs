@@ -13,7 +13,7 @@ const SAME_PERSON_M: f64 = 0.25;
 const MOST_M: f64 = 0.3;
 
 /// Returns the parts of a view's best candidate in pixels of the frame, once with left and right as named by the network or filters, and
-/// once with left and right swapped. Returns `None` if the view has no candidate, or is not sure enough of it.
+/// once with left and right swapped. Returns `None` if the view has no candidate, or if its candidate is too uncertain.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,

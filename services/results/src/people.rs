@@ -120,7 +120,7 @@ impl Counted {
         self.gone.extend(gone.map(|(id, one)| (id, one.summary(id))));
     }
 
-    /// Adds a person in a frame that a killed process had written.
+    /// Adds a person from a frame that an earlier start of this process wrote before it was killed.
     pub(crate) fn line(&mut self, frame: u64, person: &PersonLine, time_s: Option<f64>) {
         if person.status != runfiles::FrameLine::OK {
             return;

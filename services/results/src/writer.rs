@@ -39,7 +39,7 @@ pub(crate) struct Writer {
 impl Writer {
     pub(crate) fn start(job: Job, service: &Service) -> Result<Self, Failure> {
         let (session, resume) = (service.session(), service.epoch() > 0);
-        // If a folder becomes unwritable during the run, this must not end the other processes.
+        // A folder that becomes unwritable during the run is no reason to end the other processes.
         let kind = if resume {
             ExitKind::Run
         } else {

@@ -1,4 +1,4 @@
-//! Joins the poses of views and pairs, decides left and right, triangulates, and sends the results.
+//! Joins the poses of views and pairs of views, decides left and right, triangulates, and sends the results.
 
 use core::time::Duration;
 use std::sync::Arc;

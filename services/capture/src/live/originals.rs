@@ -127,7 +127,7 @@ impl KeptStream {
         }
     }
 
-    /// Keeps the pieces whose pictures have been decoded, or should have been.
+    /// Passes on the pieces whose pictures have been decoded, or should have been decoded by now.
     pub(super) fn put_all(&mut self, pieces: &Pieces, arrived_at_nanos: u64) {
         self.originals.lose(pieces.take_lost());
         while let Some(piece) = pieces.next() {

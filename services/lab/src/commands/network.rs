@@ -133,7 +133,7 @@ fn look(network: &PoseNetwork, image: &Path, arguments: &Arguments) -> Result<Ve
     network::keypoints_json(&sight)
 }
 
-/// Reads a picture file, or the first picture of a file with several.
+/// Reads a picture file, or the first picture of a file with several pictures.
 fn first_picture(file: &Path) -> Result<Picture, Failure> {
     let one = Frames {
         every: 1,

@@ -94,7 +94,7 @@ impl NetworkView {
 
     /// Returns the data by which the same person is found in other views.
     ///
-    /// * `height`: height of the box, as a share of the picture's height.
+    /// * `height`: height of the box, as a fraction of the picture's height.
     pub fn person(&self, height: f64) -> SeenPerson {
         let joint = |keypoint: &Option<keypoints::Keypoint>| {
             keypoint.map(|keypoint| (keypoint.at, keypoint.score))

@@ -16,7 +16,7 @@ use crate::person::read_options;
 
 /// Score above which a box of the teacher counts as a person. Boxes with a lower score are ignored.
 const SURE: f64 = 0.4;
-/// Overlap above which a box of the teacher shows a marked person: the shared area as a share of the union of both boxes. A box of the
+/// Overlap above which a box of the teacher shows a marked person: the shared area as a fraction of the union of both boxes. A box of the
 /// teacher that is mostly within a marked box also counts as the marked person's box.
 const SAME: f64 = 0.4;
 /// Distance by which a joint may be outside the picture, in pixels. In manual annotations, invisible joints can be anywhere.

@@ -158,8 +158,8 @@ impl ResourceMonitor {
     }
 }
 
-/// Returns the class of an age: the binary logarithm of the age in seconds, rounded down. Ages in one class differ by less than a factor of
-/// two.
+/// Returns the class of an age, which is computed from the binary logarithm of the age in seconds. Ages in one class differ by less than a
+/// factor of two.
 fn age_class(nanos: u64) -> u32 {
     (nanos / 1_000_000_000).checked_ilog2().map_or(0, |exponent| exponent + 1)
 }

@@ -66,7 +66,7 @@ impl EpochSource {
 }
 
 impl Cost {
-    /// Computes the cost from the times of the fault and the results of the run.
+    /// Computes the effects from the times of the fault and the results of the run.
     ///
     /// * `source`: the part of a result that contains the epoch of the process.
     /// * `times`: the times of the fault.

@@ -167,7 +167,7 @@ mod tests {
 
     /// Returns the poses of a walking person as the cameras see them. A camera that sees the person from behind swaps left and right.
     ///
-    /// * `shown`: for every camera, the index of the camera whose pictures its footage contains.
+    /// * `shown`: for every camera, the index of the camera from which its pictures really are.
     fn seen(rig: &Rig, shown: [usize; 4]) -> String {
         let mut text = String::new();
         let random = &mut fastrand::Rng::with_seed(5);
