@@ -76,7 +76,7 @@ impl InProcess {
         })
     }
 
-    /// Estimates the next frame.
+    /// Computes the poses and 3D joints of the next frame.
     ///
     /// * `frames`: frames of the views, as the capture processes send them; `None` for a missing view.
     ///

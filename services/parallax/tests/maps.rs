@@ -130,7 +130,7 @@ pub(crate) fn as_it_is(joint: usize) -> usize {
     joint
 }
 
-/// Exchanges left and right.
+/// Swaps left and right.
 pub(crate) fn exchanged(joint: usize) -> usize {
     let pair = skeleton::SIDES.iter().find(|side| side.contains(&joint));
     pair.map_or(joint, |[a, b]| a + b - joint)

@@ -180,7 +180,7 @@ impl Folder {
 
     /// Gives every file its final name, in alphabetical order: `summary.json` comes after the files that it mentions.
     ///
-    /// Returns the errors. All other files get their names nevertheless.
+    /// Returns the errors. All other files still get their final names.
     pub fn finish(&self) -> Vec<FolderError> {
         let mut names = self.parts.clone();
         names.sort();

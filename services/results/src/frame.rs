@@ -181,7 +181,7 @@ pub(crate) struct Own {
     pub(crate) score: f32,
     /// True if the view is sure that this is a person.
     pub(crate) is_clear: bool,
-    /// The pose by the paper's method.
+    /// The pose found by the paper's method.
     pub(crate) pose: Option<Pose>,
 }
 

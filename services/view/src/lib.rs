@@ -7,7 +7,7 @@
 //!
 //! | part | module |
 //! |---|---|
-//! | subject of the page, and listening address | [`Options`], [`run`] |
+//! | the run to show, and the address to listen on | [`Options`], [`run`] |
 //! | cameras, joints, meaning of the numbers | `scene` |
 //! | one frame as text for the page | `moment` |
 //! | a reduced picture as JPEG | `picture` |

@@ -1,4 +1,4 @@
-//! Options: subject of the page, and listening address.
+//! Options: the run to show, and the address to listen on.
 
 use core::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;

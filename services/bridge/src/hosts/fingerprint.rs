@@ -14,7 +14,7 @@ pub struct Fingerprint(Vec<(String, String)>);
 pub struct Difference {
     /// Name of the file or setting, such as `rig` or `model`.
     pub what: String,
-    /// Hash on the host that compares.
+    /// Hash on the host that makes the comparison.
     pub here: String,
     /// Hash on the other host.
     pub there: String,

@@ -36,7 +36,7 @@ pub(super) struct Taken {
     pub n_overtaken: u64,
     /// True if the pixels are valid.
     pub is_whole: bool,
-    /// Clock that gives the time of the picture.
+    /// Clock by which the time of the picture was measured.
     pub timed_by: TimedBy,
     /// Shortest delay of the pictures by the camera's own clock, in nanoseconds, even if that clock is not trusted; `None` if unknown.
     pub delay_nanos: Option<i64>,

@@ -37,7 +37,7 @@ pub(crate) struct Picture {
     pub arrived_at_nanos: u64,
     /// Number of earlier pictures that this picture has overtaken, because this process was slow.
     pub n_overtaken: u64,
-    /// Clock that gives the time of the picture.
+    /// Clock by which the time of the picture was measured.
     pub timed_by: TimedBy,
 }
 

@@ -43,7 +43,7 @@ pub struct EvidenceJob<'a> {
     pub stress: &'a [Stress],
     /// Settings of the frames.
     pub film: FilmSettings,
-    /// Bootstrap for the intervals.
+    /// Bootstrap that computes the confidence intervals.
     pub bootstrap: Bootstrap,
     /// Stop request.
     pub stop: Stop,

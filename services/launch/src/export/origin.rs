@@ -22,7 +22,7 @@ pub enum Lines {
     /// The trajectories as the run found them.
     #[default]
     Raw,
-    /// The trajectories as `parallax smooth` has smoothed them.
+    /// The trajectories smoothed by `parallax smooth`.
     Smooth,
 }
 
