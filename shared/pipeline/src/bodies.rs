@@ -1,4 +1,4 @@
-//! Checks the joints found as a body: impossible joints are left out, and bones keep their lengths.
+//! Checks whether the joints found can belong to one human body: removes impossible joints, and keeps the bones at their lengths.
 
 use geometry::{TriangulateError, Triangulated};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -13,7 +13,7 @@ pub enum NoJoint {
     /// The joint cannot be triangulated.
     #[error(transparent)]
     Triangulation(#[from] TriangulateError),
-    /// No body can have the joint at the place where it was found.
+    /// No human body can have the joint at the position that was found.
     #[error("no human body can have the joint at this position")]
     Implausible,
 }
@@ -25,11 +25,11 @@ pub struct Body {
     pub stature_m: Option<f64>,
     /// Root mean square deviation of the bone lengths from the mean lengths of people, in standard deviations.
     pub deviation: f64,
-    /// Reason why the skeleton is not that of a person; if set, no joint has a position.
+    /// Reason why the skeleton cannot be a person's; if set, no joint has a position.
     pub nobody: Option<Reason>,
 }
 
-/// The bodies of a run; learns the bone lengths of the person.
+/// Checks the skeletons of one person from frame to frame, and learns the person's bone lengths.
 #[derive(Debug, Default)]
 pub(crate) struct Bodies {
     lengths: Lengths,
@@ -40,7 +40,7 @@ pub(crate) struct Bodies {
 /// After this many frames without a body, the next body is assumed to be another person's.
 const FORGET_AFTER: u32 = 30;
 
-/// Change of one of the 14 joints.
+/// Correction of one of the 14 joints.
 struct Change {
     is_dropped: bool,
     /// Displacement of the joint, and its new covariance.
@@ -48,10 +48,10 @@ struct Change {
 }
 
 impl Bodies {
-    /// Removes joints that no body can have, and moves the others so that bones keep their lengths.
+    /// Removes joints that are impossible for a human body, and moves the others so that the bones keep their lengths.
     ///
     /// * `of_body`: the joints of `skeleton::PARSE14`.
-    /// * `joints`: the joints of the set.
+    /// * `joints`: the joints of the skeleton's own joint set.
     pub(crate) fn settle(
         &mut self,
         settings: &BodySettings,
@@ -114,7 +114,7 @@ impl Bodies {
     }
 }
 
-/// Returns the joints of `skeleton::PARSE14` that use the same parts as a joint of a set.
+/// Returns the joints of `skeleton::PARSE14` that are made of the same body parts as the given joint.
 fn same_parts(joint: &Joint) -> impl Iterator<Item = usize> {
     let of_body = PARSE14.joints.iter().enumerate();
     let same = of_body.filter(|(_, it)| it.parts.iter().any(|part| joint.parts.contains(part)));

@@ -1,4 +1,4 @@
-//! The network method in one process: pictures or keypoints of all views in, skeletons out.
+//! Runs the network method in one process: from pictures or keypoints of all views to skeletons.
 
 use std::sync::Arc;
 
@@ -19,11 +19,12 @@ use crate::{
 pub struct NetworkEstimatorSettings {
     /// Settings of the step that identifies people.
     pub who: WhoSettings,
-    /// Settings of the step in space.
+    /// Settings of the step that solves for the joints in 3D.
     pub space: SpaceStepSettings,
-    /// Frames per second, if known. If not, points are not moved from the time of their picture to the instant of the frame.
+    /// Frame rate, in frames per second, if known. If it is unknown, points are not corrected for the time between their picture and the
+    /// frame.
     pub frame_rate_hz: Option<f64>,
-    /// Maximum number of frames after which people can still be expected in their boxes.
+    /// Number of frames after which people may have left their boxes.
     pub most_apart: Option<f64>,
 }
 
@@ -36,7 +37,7 @@ pub struct ViewFrame<'a> {
     pub skew_s: f64,
 }
 
-/// Contribution of a view to a frame.
+/// What a view provides for a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum ViewContent<'a> {
     /// The picture of the view.
@@ -55,7 +56,7 @@ struct View {
 /// The result of one frame.
 #[derive(Debug, Clone)]
 pub struct NetworkEstimate {
-    /// The people seen by each view; `None` if the view is missing or sees nobody.
+    /// The people seen by each view; `None` if the view is missing or nobody is seen in it.
     pub sightings: Vec<Option<Sightings>>,
     /// The identified people.
     pub people: FramePeople,
@@ -75,7 +76,7 @@ pub struct NetworkEstimator {
 impl NetworkEstimator {
     /// Prepares the pipeline for a rig.
     ///
-    /// * `plans`: the views of the rig, in the rig's order.
+    /// * `plans`: the prepared views, in the rig's order.
     /// * `steps`: the single-view steps, one per view.
     pub fn new(
         plans: &[Arc<ViewPlan>],
@@ -158,7 +159,7 @@ impl View {
     }
 }
 
-/// Returns the time of a frame, in seconds; if the rate is unknown, a common rate is assumed.
+/// Returns the time of a frame, in seconds; if the frame rate is unknown, a typical one is assumed.
 pub fn time_s(frame: u64, frame_rate_hz: Option<f64>) -> f64 {
     const COMMON_HZ: f64 = 30.0;
     frame as f64 / frame_rate_hz.unwrap_or(COMMON_HZ)

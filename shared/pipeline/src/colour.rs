@@ -1,4 +1,4 @@
-//! The colour of a person's trunk in a picture, by which people are told apart.
+//! The colour of a person's trunk in a picture, which helps to tell people apart.
 
 use kernels::Rgb8View;
 
@@ -7,15 +7,16 @@ use crate::placed::N;
 /// The joints of the trunk: left and right hip, left and right shoulder.
 const HIPS: [usize; 2] = [2, 3];
 const SHOULDERS: [usize; 2] = [8, 9];
-/// Number of samples from the shoulders to the hips, and (below) from one side to the other.
+/// Number of samples along the trunk from the shoulders to the hips; the next constant is the number across the trunk.
 const DOWN: usize = 7;
 const ACROSS: usize = 5;
-/// Sampled part of the trunk, as shares of its height and width: the rest often shows collars, belts, arms or the background.
+/// The sampled area of the trunk, as fractions of its height and of its width. Nearer to its edges, there are often collars, belts, arms or
+/// background.
 const HEIGHT: [f32; 2] = [0.15, 0.85];
 const WIDTH: [f32; 2] = [0.25, 0.75];
 
-/// Returns the median red, green and blue of the trunk, 0 to 1; `None` if a shoulder or a hip is not seen, or if the trunk is outside of
-/// the picture.
+/// Returns the median red, green and blue of the trunk, 0 to 1; `None` if a shoulder or a hip is not seen, or if the trunk is outside the
+/// picture.
 ///
 /// * `joints`: positions of the joints, in pixels of the picture.
 pub(crate) fn trunk_colour(
@@ -44,7 +45,7 @@ pub(crate) fn trunk_colour(
     (values[0].len() > DOWN * ACROSS / 2).then(|| values.map(median))
 }
 
-/// Returns the position of a sample between two limits, as a share.
+/// Returns the position of the `nth` of `n` samples between two limits, as a fraction.
 fn at_share([first, last]: [f32; 2], nth: usize, n: usize) -> f32 {
     first + (last - first) * nth as f32 / (n - 1) as f32
 }

@@ -1,4 +1,4 @@
-//! Measures how far the findings of the single views are from the result.
+//! Measures how far the joints found in the single views are from the 3D result.
 
 use std::sync::Arc;
 
@@ -11,36 +11,36 @@ use crate::bodies::NoJoint;
 use crate::motion::Motion;
 use crate::sighting::Sightings;
 
-/// Maximum median distance of a view's joints from the result at which the view shows the same person, in metres.
+/// Maximum median distance, in metres, between a view's joints and the result; beyond it, the view shows another person.
 const SAME_PERSON_M: f64 = 0.25;
-/// Maximum disagreement that is added to the covariance of a joint, in metres; also used if fewer than two views see the joint.
+/// Maximum disagreement that is added to the covariance of a joint, in metres. It is also used if fewer than two views see the joint.
 const MOST_M: f64 = 0.3;
-/// Error of joints on which all views agree, in metres: the position of a joint within the body is not defined more precisely.
+/// Error of joints on which all views agree, in metres: the position of a joint in the body is not defined any more precisely.
 const DEFINITION_M: f64 = 0.02;
-/// Share of the covariance from picture noise that is kept when the disagreement is added.
+/// Fraction of the covariance caused by picture noise that is kept when the disagreement is added.
 const NOISE_SHARE: f64 = 0.5;
 
-/// The views of a frame and their single-view findings.
+/// The views of a frame and the people found in each.
 #[derive(Clone, Copy)]
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
     pub(crate) answers: &'a [Option<Sightings>],
     /// For every view, true if the view contributed to the result.
     pub(crate) takes_part: &'a [bool],
-    /// Minimum heat of half of the joints of a candidate, if its view did not contribute to the result. Only then does the view count as
+    /// Minimum heat that half of a candidate's joints must have, if its view did not contribute to the result. Such a view then counts as
     /// one that sees the person elsewhere.
     pub(crate) least_heat: f64,
     pub(crate) joints: &'static JointSet,
 }
 
-/// Compares the joints of a result solved in space with the poses found by the single views.
+/// Compares the 3D joints of a result with the poses found in the single views.
 ///
-/// Each view is represented by its nearest candidate, with sides as labelled or exchanged. A view that did not contribute also counts if it
-/// sees a person clearly. Views that show another person are ignored if at least two other views agree. The function sets the residuals of
-/// every joint and their root mean square. It also adds the disagreement of the two views that agree best on a joint to the joint's
-/// covariance (docs/method/three-d.md).
+/// Each view is represented by its nearest candidate, with left and right either as labelled or swapped. A view that did not contribute to
+/// the result is also compared if it sees a person clearly. Views that show another person are ignored if at least two other views agree.
+/// The function sets the residuals of every joint and their root mean square. It also adds an error to each joint's covariance: the
+/// disagreement of the two views that agree best on the joint (docs/method/three-d.md).
 ///
-/// * `motion`: motion of the solution in the views.
+/// * `motion`: motion of the solved joints in the pictures.
 pub(crate) fn measure(
     found_by: &FoundByViews<'_>,
     motion: &mut Motion,
@@ -84,7 +84,7 @@ pub(crate) fn measure(
     }
 }
 
-/// Returns the distances of the joints from the view's nearest candidate, in pixels; NaN for a joint that the view does not see.
+/// Returns the distances of the joints from those of the view's nearest candidate, in pixels; NaN for a joint that the view does not see.
 fn nearest(
     found_by: &FoundByViews<'_>,
     motion: &mut Motion,
@@ -116,7 +116,7 @@ fn nearest(
         .min_by(|a, b| sum(a).total_cmp(&sum(b)))
 }
 
-/// Converts distances in a picture to metres at the depth of the joints.
+/// Converts distances in a picture to metres, at the distance of the joints from the camera.
 fn in_metres(
     plan: &ViewPlan,
     joints: &[Result<Triangulated, NoJoint>],
@@ -134,7 +134,7 @@ fn in_metres(
 
 /// Returns the covariance of a joint, widened by the disagreement of the views.
 ///
-/// * `disagreements_m`: distance of each view's finding from the joint, in metres.
+/// * `disagreements_m`: distance between the joint and its position according to each view, in metres.
 fn widened(covariance: &Matrix3<f64>, disagreements_m: &mut [f64]) -> Matrix3<f64> {
     disagreements_m.sort_by(f64::total_cmp);
     let second = disagreements_m
@@ -152,7 +152,7 @@ fn median(values: &[f64]) -> Option<f64> {
     known.get(known.len() / 2).copied()
 }
 
-/// Returns the joints of all candidates of a view, with sides as labelled and exchanged.
+/// Returns the joints of all candidates of a view, both with left and right as labelled and with them swapped.
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,

@@ -1,4 +1,4 @@
-//! The paper's method in one process: one synchronised set of images in, one skeleton out.
+//! Runs the paper's method in one process: from one synchronised set of images to one skeleton.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use crate::{
 /// Reason why an estimator could not be created.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum EstimatorError {
-    /// A view's frames are too small for the model.
+    /// The frames of a view are too small for the model.
     #[error("view {view:?}")]
     TooSmall {
         /// Name of the camera.
@@ -33,13 +33,13 @@ pub enum EstimatorError {
 pub struct Estimate {
     /// The single-view results.
     pub answers: Vec<Option<ViewResult>>,
-    /// The start of all views together: the candidate of every view, and whether its sides are exchanged.
+    /// The candidate of each view from which the joint optimisation starts, and whether its left and right are swapped.
     pub start: Vec<Option<(usize, bool)>>,
     /// The part of every view's image that was searched.
     pub scopes: Vec<Option<Scope>>,
     /// The results of the pairs; empty if all views are solved at once.
     pub pairs: Vec<PairResult>,
-    /// The result of all views at once, if they are solved that way.
+    /// The result of solving all views at once, if that method is selected.
     pub all_views: Option<AllViewsResult>,
     /// The resulting skeleton.
     pub skeleton: Skeleton,
@@ -191,7 +191,7 @@ impl Estimator {
     }
 }
 
-/// Searches a view near the last pose, or in full if that does not suffice.
+/// Searches a view near the last pose, or the whole image if that is not good enough.
 fn search(
     step: &ViewStep,
     tracker: &mut Tracker,
@@ -212,7 +212,7 @@ fn search(
 pub struct EstimatorSettings {
     /// Settings of the single-view step.
     pub view: ViewSettings,
-    /// How views are solved: in pairs, or all at once.
+    /// Whether views are solved in pairs or all at once.
     pub views: Views,
     /// The person to follow if there are several.
     pub follow: Follow,

@@ -1,4 +1,4 @@
-//! Triangulates extra keypoints: points that networks name in addition to the joints of the skeleton (face, feet, hands).
+//! Triangulates extra keypoints: points on the face, feet or hands that some networks find in addition to the joints of the skeleton.
 //!
 //! The tree model does not contain them, so each is triangulated separately. Only the views that found the keypoint on the person chosen
 //! by fusion are used.
@@ -16,18 +16,18 @@ use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
 
-/// Maximum median distance between the joints of a candidate and of the fused pose, as a share of the longer side of the fused pose.
-/// A candidate farther away is another person.
+/// Maximum median distance between the joints of a candidate and of the fused pose, as a fraction of the longer side of the fused pose. A
+/// candidate farther away is taken for another person.
 const SAME: f64 = 0.1;
-/// A view farther off than this many standard deviations is left out.
+/// A view is left out if its point is more than this many standard deviations away.
 const MOST_SIGMAS: f64 = 3.0;
-/// Minimum distance at which a view is left out, as a share of the longer side of the fused pose.
+/// A view is only left out if its point is at least this far away, as a fraction of the longer side of the fused pose.
 const LEAST_REACH: f64 = 0.02;
 /// Maximum distance of a keypoint from the nearest joint of its person, in metres.
 const MOST_FROM_JOINTS_M: f64 = 0.5;
 
-/// Pairs of joints of `skeleton::PARSE14`, right and left, that show how a view labels the sides: knees and ankles, elbows and
-/// wrists, hips and shoulders.
+/// Pairs of left and right joints of `skeleton::PARSE14` that show which side a view labels as left: knees and ankles, elbows and wrists,
+/// hips and shoulders.
 const LEGS: [[usize; 2]; 2] = [SIDES[0], SIDES[1]];
 const ARMS: [[usize; 2]; 2] = [SIDES[3], SIDES[4]];
 const TRUNK: [[usize; 2]; 2] = [SIDES[2], SIDES[5]];
@@ -35,9 +35,9 @@ const TRUNK: [[usize; 2]; 2] = [SIDES[2], SIDES[5]];
 /// An extra keypoint.
 #[derive(Debug)]
 struct Extra {
-    /// Index of the keypoint on the other side; the keypoint's own index if it has no side.
+    /// Index of the same keypoint on the other side of the body; the keypoint's own index if it has no side.
     mirror: usize,
-    /// The joint pairs that determine the side of this keypoint.
+    /// The joint pairs that determine whether this keypoint is on the left or on the right.
     sides: [[usize; 2]; 2],
 }
 
@@ -119,7 +119,7 @@ impl ExtrasStep {
         }
         let joints = PARSE14.from_parts(&fused.pose.centres_px);
         let longer_px = geometry::longer_side(joints.iter().copied())?;
-        // The extra keypoints of the last people may be missing.
+        // The last people in the list may have no extra keypoints.
         let told = found.people.iter();
         let told = told.filter(|sighting| sighting.extras.len() == self.extras.len());
         let of_candidate = told.map(|sighting| {
@@ -193,7 +193,7 @@ impl Match {
     }
 }
 
-/// Returns the joint pairs that show the side of a keypoint.
+/// Returns the joint pairs that determine whether a keypoint is on the left or on the right.
 fn sides_of(name: &str) -> [[usize; 2]; 2] {
     let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
     if has(&["toe", "heel", "foot", "ankle", "knee"]) {
@@ -205,7 +205,7 @@ fn sides_of(name: &str) -> [[usize; 2]; 2] {
     }
 }
 
-/// Returns the median distance of the joints; the sides of each joint may be exchanged.
+/// Returns the median distance of the joints; left and right of each pair may be swapped.
 fn middle_distance(own: &[[f64; 2]], fused: &[[f64; 2]]) -> f64 {
     let mirror = |joint: usize| {
         let pair = SIDES.iter().find(|side| side.contains(&joint));

@@ -17,15 +17,15 @@ pub enum Follow {
     Last,
     /// The person who is largest in the pictures.
     Largest,
-    /// The person that most views see, and that they see most clearly.
+    /// The person who is seen by the most views, and most clearly.
     Clearest,
 }
 
-/// Maximum distance of the followed person from the place in the previous frame, in metres, and its growth for every frame
+/// Maximum distance in metres between the followed person's positions in two frames. The limit grows by the same amount for every frame
 /// without the person.
 const REACH_M: f64 = 1.0;
 const REACH_PER_FRAME_M: f64 = 0.1;
-/// The number of frames to wait for a missing person equals the number of frames with the person, up to this maximum.
+/// A missing person is waited for as many frames as the person was seen in, up to this maximum.
 const MOST_PATIENCE: u32 = 30;
 
 /// Follows one person from frame to frame.
@@ -44,7 +44,7 @@ pub struct Following {
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Others {
     of_views: Vec<u64>,
-    /// Bit `v` is set if view `v` sees others, but not the followed person.
+    /// Bit `v` is set if view `v` sees other people, but not the followed person.
     without: u64,
     /// For each view, the candidate that shows the followed person.
     own: Vec<Option<usize>>,
@@ -116,7 +116,7 @@ impl Following {
         chosen
     }
 
-    /// Returns the person nearest to the last place, or the first person if the last one has been away for too long.
+    /// Returns the person nearest to the last known position, or the first person if the followed person has been missing for too long.
     fn nearest(&mut self, people: &[Person]) -> Option<usize> {
         let near = self.last.and_then(|last| {
             let reach = REACH_M + REACH_PER_FRAME_M * f64::from(self.n_without);
@@ -134,7 +134,7 @@ impl Following {
         if self.patience > 0 {
             return None;
         }
-        // Start following a new person.
+        // Starts to follow a new person.
         let first = people.first()?;
         (self.last, self.patience, self.n_without) = (Some(first.place), 1, 0);
         self.id += 1;
@@ -196,7 +196,7 @@ mod tests {
         let frames = [vec![both; n + 10], vec![one; n], vec![both; 2]].concat();
         let got = chosen(Follow::Last, &frames);
         assert!(got[..n + 10].iter().all(|place| *place == Some(-1.0)));
-        // The other person, two metres away, is out of reach for ten frames.
+        // For ten frames, the other person, two metres away, is too far away to be the followed person.
         assert!(got[n + 10..n + 20].iter().all(Option::is_none));
         assert_eq!(got.last(), Some(&Some(1.0)), "the new one is kept");
     }

@@ -1,5 +1,4 @@
-//! The fusion step: maximises the joint energy of pairs of views, or of all views. It reads the
-//! evidence in place.
+//! The fusion step: maximises the joint energy of pairs of views, or of all views. It reads the evidence without copying it.
 
 use std::sync::Arc;
 
@@ -35,20 +34,21 @@ pub struct FuseStep {
     space: Space,
 }
 
-/// The result of a pair: one estimate per assumption about facing.
+/// The result of a pair: one estimate for each assumption about whether both views see the person from the same side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairResult {
     /// The two views, in ascending order.
     pub views: [usize; 2],
-    /// The estimates for same facing, then for opposite facing; the latter only if facing must be decided.
+    /// The estimate for two views that see the person from the same side, then the one for opposite sides. The second exists only if this
+    /// must be decided.
     pub hypotheses: Vec<PairEstimate>,
 }
 
-/// Number of assumptions about facing that are judged in space; the ones with the highest energies are taken.
+/// Number of assumptions about front and back views that are judged in 3D; the ones with the highest energies are taken.
 const N_RANKED: usize = 32;
 
-/// Number of assumptions about facing that are tried with all views at once; the message of a pair
-/// has room for the same number.
+/// Number of assumptions about front and back views that are tried with all views at once; the message of a pair also has room for this
+/// many.
 const N_STARTS: usize = 2;
 
 /// Number of views of a frame that are solved together.
@@ -66,7 +66,7 @@ pub enum Views {
 pub enum Support {
     /// Each pair has weight 1: the terms of the other views add up.
     Sum,
-    /// The other views together weigh as much as the one other view of a pair.
+    /// The other views together have the same weight as the single other view of a pair.
     Mean,
 }
 
@@ -75,18 +75,18 @@ pub enum Support {
 pub struct AllViewsResult {
     /// The views with a result, in ascending order.
     pub views: Vec<usize>,
-    /// One estimate per assumption about facing; never empty.
+    /// One estimate for each assumption about which views see the person from behind; never empty.
     pub hypotheses: Vec<AllViewsHypothesis>,
 }
 
-/// The result of all views at once under one assumption about facing.
+/// The result of all views at once under one assumption about which views see the person from behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsHypothesis {
     /// For each view, true if its left and right are assumed to be exchanged relative to the first view.
     pub exchanged: Vec<bool>,
     /// The candidate of each view from which the solution started.
     pub candidates: Vec<usize>,
-    /// The result, by index into the views.
+    /// The result; its lists are indexed like `views`.
     pub estimate: AllViewsEstimate,
 }
 
@@ -140,8 +140,8 @@ impl FuseStep {
 
     /// Returns the common start of all views of a frame; `None` for views without a result.
     ///
-    /// Every fusion worker computes the start for all views. It needs only their (small) single-view results,
-    /// and all pairs start from the same person.
+    /// Every fusion worker computes this start for all views. The computation needs only the single-view results, which are small. So all
+    /// pairs start from the same person.
     ///
     /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
     pub fn start(
@@ -235,10 +235,9 @@ impl FuseStep {
         Some(PairResult { views, hypotheses })
     }
 
-    /// Solves all views at once. Starts from the best starts under different assumptions about which views
-    /// see the person from behind.
+    /// Solves all views at once, from the best starting poses under different assumptions about which views see the person from behind.
     ///
-    /// * `evidence`: evidence of the views with a result; should include its bounds.
+    /// * `evidence`: evidence of the views with a result; it should include its bounds.
     /// * `others`: candidates that show other people ([`Following::others`](crate::Following::others)).
     /// * Returns `None` if fewer than two views have a result whose poses are [covered](Responses::covers)
     ///   by their evidence.
@@ -293,9 +292,10 @@ impl FuseStep {
         })
     }
 
-    /// Returns the best starts, judged by their energies, the agreement of the views in space, and the front evidence of the views.
+    /// Returns the most likely starts, judged by their energies, by how well the views agree in 3D, and by the views' evidence of the
+    /// direction in which the person faces.
     ///
-    /// * `starts`: highest energy first.
+    /// * `starts`: the starts, highest energy first.
     fn most_likely(
         &self,
         mut starts: Vec<Start>,
@@ -319,7 +319,7 @@ impl FuseStep {
         starts
     }
 
-    /// Returns the candidates of a start, with parts named by the side of the body; one entry for each view of the rig.
+    /// Returns the candidates of a start, with parts named by the person's left and right; one entry for each view of the rig.
     fn start_views(
         &self,
         start: &Start,

@@ -1,11 +1,11 @@
-//! The result of fusion, by pairs or by all views at once, under each assumption about facing.
+//! The result of fusion, by pairs or by all views at once, under each assumption about which views see the person from behind.
 
 use fmp::Pose;
 use multiview::{Exchanges, PairEnergies, PairEstimate, is_exchanged, rank_facing};
 
 use crate::{AllViewsHypothesis, AllViewsResult, PairResult};
 
-/// Number of facing assignments that are compared over all views.
+/// Number of assumptions about front and back views that are compared over all views.
 const N_HYPOTHESES: usize = 16;
 
 /// The result of fusion, in pairs or all views at once.
@@ -23,7 +23,7 @@ impl<'a> Fused<'a> {
         }
     }
 
-    /// Returns the best assumptions about facing, each with its energy over all views.
+    /// Returns the best assumptions about which views see the person from behind, each with its energy over all views.
     pub(crate) fn facing(&self, present: Exchanges) -> Vec<(Exchanges, f64)> {
         match self {
             Self::Pairs(pairs) => {
@@ -44,7 +44,7 @@ impl<'a> Fused<'a> {
         }
     }
 
-    /// Returns the poses of a view under an assumption about facing, with their energies: one per pair of
+    /// Returns the poses of a view, with their energies, under an assumption about which views see the person from behind: one per pair of
     /// the view, or a single one if all views were solved at once.
     pub(crate) fn poses(&self, view: usize, exchanged: Exchanges) -> Vec<(f64, &'a Pose)> {
         match self {
@@ -69,8 +69,8 @@ impl<'a> Fused<'a> {
 }
 
 impl Fused<'_> {
-    /// Returns the candidate of a view from which fusion started, under an assumption about facing; `None` if the
-    /// view was not fused.
+    /// Returns the candidate of a view from which fusion started, under an assumption about which views see the person from behind; `None`
+    /// if the view was not fused.
     pub(crate) fn start(&self, view: usize, exchanged: Exchanges) -> Option<usize> {
         match self {
             Self::Pairs(pairs) => pairs.iter().find_map(|pair| {
@@ -85,7 +85,8 @@ impl Fused<'_> {
     }
 }
 
-/// Returns the hypothesis for an assumption about facing or for its complement; otherwise the best hypothesis.
+/// Returns the hypothesis that matches an assumption about which views see the person from behind, or the opposite assumption; otherwise
+/// the best hypothesis.
 fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsHypothesis> {
     let all = result.views.iter().fold(0, |mask, view| mask | (1 << view));
     let fits = |hypothesis: &&AllViewsHypothesis| {
@@ -103,7 +104,7 @@ fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchan
     })
 }
 
-/// Returns the hypothesis of a pair that agrees with the joint facing decision.
+/// Returns the hypothesis of a pair that agrees with the decision for all views about who sees the person from behind.
 fn chosen(pair: &PairResult, exchanged: Exchanges) -> Option<&PairEstimate> {
     let [first, second] = pair.views.map(|view| is_exchanged(exchanged, view));
     let opposite = first != second;

@@ -6,7 +6,7 @@ use multiview::{Exchanges, FusedPose, ViewPlan, average, is_exchanged};
 /// One view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedView {
-    /// The pose combined from the poses of the view's pairs; parts are named by the side of the body.
+    /// The pose combined from the poses of the view's pairs; parts are named by the person's left and right.
     pub pose: FusedPose,
     /// True if the view sees the person from behind.
     pub exchanged: bool,
@@ -16,7 +16,7 @@ pub struct FusedView {
     pub single_score: f64,
 }
 
-/// A pose of one view; parts are named by the side of the body.
+/// A pose of one view; parts are named by the person's left and right.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) energy: f64,
@@ -27,7 +27,7 @@ pub(crate) struct Candidate {
 impl Candidate {
     /// Creates the candidate of a pose.
     ///
-    /// * `mirror`: permutation of the parts if the view sees the person from behind.
+    /// * `mirror`: permutation that swaps left and right parts, if the view sees the person from behind.
     pub(crate) fn of_pose(
         pose: &Pose,
         energy: f64,
@@ -43,7 +43,7 @@ impl Candidate {
         }
     }
 
-    /// Returns the view with this pose alone, unchanged by any pair.
+    /// Returns the fused view that has only this pose, unchanged by any pair.
     pub(crate) fn alone(self, exchanged: bool) -> FusedView {
         FusedView {
             pose: FusedPose {

@@ -1,4 +1,4 @@
-//! Runs a network on the people of a frame, and keeps the people who are seen well.
+//! Runs a network on the people of a frame, and keeps those who are clearly visible.
 
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
@@ -6,43 +6,43 @@ use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap}
 use crate::network_memory::{Empty, NetworkMemory, Seen, is_known, shift};
 use crate::tracks::{Pace, Track, moved, wider};
 
-/// Two boxes that overlap by more than this show the same person.
+/// Overlap of two boxes above which they show the same person.
 const SAME: f64 = 0.5;
-/// Two boxes of a detector that overlap by more than this show the same person.
+/// Overlap of two detector boxes above which they show the same person.
 const SAME_BOX: f64 = 0.85;
-/// A person whose box overlaps that of a larger person by more than this may soon be hidden.
+/// Overlap with the box of a larger person above which a person may soon be hidden.
 const BEHIND: f64 = 0.2;
-/// Minimum number of joints of a person behind others that the others do not cover.
+/// Minimum number of joints that must remain visible for a person who is behind others.
 const LEAST_BEHIND: usize = 7;
 /// Minimum heat of a new person, as a share of the heat of the best person in the frame; a fainter detection is often a chair or a poster.
 const FAINT: f64 = 0.7;
-/// Minimum heat of a joint that counts for the position of its person, 0 to 1.
+/// Minimum heat (0 to 1) at which a joint is used to compute the person's position.
 const SURE: f64 = 0.2;
 
-/// Looks at the people of a frame, one after another.
+/// Runs the network on the people of a frame, one after another.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Looks<'a> {
     pub(crate) looker: Looker<'a>,
     pub(crate) image: Rgb8View<'a>,
     /// Width and height of the picture.
     pub(crate) size: [usize; 2],
-    /// Maximum number of people to look at.
+    /// Maximum number of people on whom the network is run.
     pub(crate) n_most: usize,
-    /// Minimum mean heat of the joints of a person who is seen well, 0 to 1.
+    /// Minimum mean heat of a person's joints, 0 to 1; below it, the person is not clearly visible.
     pub(crate) least_heat: f64,
     /// Maximum amount by which the score of a pose may be below the usual score of its person.
     pub(crate) most_lost: f32,
 }
 
-/// Returns true if the joints seen in a box span a clearly different box. Either the person moved fast, or the last frame is long
-/// ago. The box then shows only part of the person, near the edge of the box.
+/// Returns true if the joints seen in a box fill a clearly different box: either the person moved fast, or the last frame is long ago. The
+/// box then shows only part of the person, near the edge of the box.
 fn has_moved(maps: &JointMaps, outline: [f64; 4]) -> bool {
     let sure = maps.peaks().iter().flatten();
     let sure = sure.filter(|sure| sure.score >= SURE).map(|sure| sure.at);
     outline_of(sure).is_some_and(|other| overlap(other, outline) < SAME)
 }
 
-/// Returns the boxes of a detector that do not belong to held people.
+/// Returns the boxes of a detector that do not belong to people whose last sighting is reused.
 pub(crate) fn of_others(outlines: Vec<[f64; 4]>, held: &[Seen]) -> Vec<[f64; 4]> {
     let of_held: Vec<usize> =
         held.iter().filter_map(|held| best_box(&outlines, held.outline)).collect();
@@ -60,19 +60,19 @@ fn best_box(outlines: &[[f64; 4]], outline: [f64; 4]) -> Option<usize> {
     best.filter(|best| best.1 > SAME).map(|best| best.0)
 }
 
-/// Returns the pace of a person of the previous frame, updated by another look.
+/// Returns the velocity of a person of the previous frame, updated with the new sighting.
 ///
-/// * `n_frames`: number of frames from the last look to this one.
+/// * `n_frames`: number of frames since the last run of the network on this person.
 fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>) -> Option<Pace> {
     let moved = shift(&before?.maps, &seen.maps)?;
     Some(Pace::next(track.pace, moved, n_frames?))
 }
 
 impl Looks<'_> {
-    /// Holds the people of the previous frame who stand still: their last sighting is reused. The first person is looked at in every frame,
-    /// and so is a person behind a larger one.
+    /// Reuses the last sightings of people who stand still. The network still runs in every frame on the first person, and on a person
+    /// behind a larger one.
     ///
-    /// * `before`: the people of the previous frame; the entries of held people are overwritten.
+    /// * `before`: the people of the previous frame; the entries of the reused people are overwritten.
     pub(crate) fn hold_still(
         &self,
         tracks: &mut [Track],
@@ -87,7 +87,7 @@ impl Looks<'_> {
             let track = &mut others[0];
             let is_behind = |larger: &Track| overlap(larger.outline, track.outline) > BEHIND;
             let n_frames = track.n_held + hold.gap;
-            // Look one frame early: by the next frame, the person would have moved too far.
+            // Run the network one frame early: by the next frame, the person would have moved too far.
             if n_frames < hold.most
                 && track.is_still(n_frames + 1)
                 && !larger.iter().any(is_behind)
@@ -98,8 +98,8 @@ impl Looks<'_> {
         }
     }
 
-    /// Looks at a person of the previous frame who has not been seen yet in this frame. If a search ran in this frame, only the last box is
-    /// used. Otherwise, the box is enlarged if the last frame is long ago, or if the last pose was doubtful.
+    /// Runs the network on a person of the previous frame who has not been seen yet in this frame. If people were searched for in this
+    /// frame, only the last box is used. Otherwise, the box is enlarged if the last frame is long ago, or if the last pose was doubtful.
     ///
     /// * `before`: the people of the previous frame.
     pub(crate) fn see_once_more(
@@ -120,8 +120,8 @@ impl Looks<'_> {
         self.see_again(track, before.get(track.index), memory)
     }
 
-    /// Looks into the boxes of a detector, each of which shows one person. A single box may fit badly, so the step looks closer into it.
-    /// With several boxes, a closer look would end at the person in front.
+    /// Runs the network on the boxes of a detector, each of which shows one person. A single box may fit badly, so the network runs again
+    /// on the box around its joints. With several boxes, that second box would be the one of the person in front.
     ///
     /// * `outlines`: the boxes, nearest person first.
     pub(crate) fn see_boxes(
@@ -144,7 +144,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at the person in a box. If this person is already known, looks at the person behind.
+    /// Runs the network on a box. If the person there is already known, looks for a person behind.
     fn see_box(
         &self,
         outline: [f64; 4],
@@ -174,9 +174,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at the person in a box behind known people, who are painted over.
-    ///
-    /// * `usual_score`: usual score of the person, if known from the previous frame.
+    /// Looks for a person in a box behind known people, who are painted over first.
     fn see_behind(
         &self,
         boxed: ([f64; 4], Turn),
@@ -203,7 +201,7 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks into a box, with the picture rotated if the person is not upright; the maps are stored in the next person.
+    /// Runs the network on a box, with the picture rotated if the person is not upright; the maps are stored in the next person.
     fn see_in(
         &self,
         (outline, turn): ([f64; 4], Turn),
@@ -225,7 +223,7 @@ impl Looks<'_> {
 
     /// Reuses the last sighting of a person of the previous frame who has hardly moved; returns true if the person was added.
     ///
-    /// * `n_held`: number of frames since the last look.
+    /// * `n_held`: number of frames since the network was last run on this person.
     /// * `before`: the sighting of the person in the previous frame; overwritten.
     fn hold(
         &self,
@@ -250,8 +248,8 @@ impl Looks<'_> {
         is_new
     }
 
-    /// Looks at a person of the previous frame in the same box and in a wider box, unless a person is already known there. Keeps the best
-    /// sighting if it is good.
+    /// Runs the network on a person of the previous frame twice, in the same box and in a wider box, unless a person is already known
+    /// there. Keeps the better sighting if it is good.
     fn see_wider(&self, track: &Track, memory: &mut NetworkMemory) -> Result<(), LookError> {
         if !self.is_unknown(track.outline, memory) {
             return Ok(());
@@ -265,10 +263,10 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks around the old box of a person last seen many frames ago, unless a person is already known there. Keeps a person who is seen
-    /// well and whose score is not much below the usual one.
+    /// Looks around the old box of a person last seen many frames ago, unless a person is already known there. Keeps a person who is
+    /// clearly visible and whose score is not much below the usual one.
     ///
-    /// * `around`: the box, enlarged for the time that has passed.
+    /// * `around`: the old box, enlarged for the time that has passed.
     fn see_later(
         &self,
         track: &Track,
@@ -288,8 +286,9 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Looks at a person of the previous frame, unless a person is already known there. If the person has moved far, looks closer, which
-    /// takes some time. If the person lies down or gets up, looks with the picture rotated. Keeps a person who is seen well.
+    /// Runs the network on a person of the previous frame, unless a person is already known there. If the person has moved far, it runs
+    /// again on a better box, which takes some time. If the person lies down or gets up, the picture is rotated. Keeps a person who is
+    /// clearly visible.
     ///
     /// * `before`: the sighting of the person in the previous frame.
     fn see_again(
@@ -340,13 +339,13 @@ impl Looks<'_> {
         Ok(())
     }
 
-    /// Returns true if another person can be kept and nobody is known in the box.
+    /// Returns true if there is room for another person, and no known person is in the box.
     fn is_unknown(&self, outline: [f64; 4], memory: &NetworkMemory) -> bool {
         let is_known = |seen: &Seen| overlap(seen.outline, outline) > SAME;
         memory.n_seen < self.n_most && !memory.people().iter().any(is_known)
     }
 
-    /// Like [`Self::keep`], for the next person, whose maps have been read.
+    /// Like [`Self::keep`], for the next person, whose maps have just been computed.
     fn keep_look(&self, look: &Look, usual_score: Option<f32>, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         seen.outline = look.outline;
@@ -357,7 +356,7 @@ impl Looks<'_> {
         self.keep(memory)
     }
 
-    /// Keeps the next person if the person is seen well and not known yet. Returns true if the person is seen well.
+    /// Keeps the next person if that person is clearly visible and not known yet. Returns true if the person is clearly visible.
     fn keep(&self, memory: &mut NetworkMemory) -> bool {
         let (_, seen) = memory.next();
         if !seen.judge(self.size, self.least_heat) {

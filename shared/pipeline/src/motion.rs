@@ -1,4 +1,4 @@
-//! Moves the findings of pictures that were not taken at the instant of their frame to that instant.
+//! Corrects the points found in pictures that were not taken at the instant of their frame: moves the points to that instant.
 
 use geometry::longer_side;
 use geometry::skew::{Tracks, Velocity, moved};
@@ -34,7 +34,7 @@ impl Motion {
         self.instant_s = instant_s;
     }
 
-    /// Returns the instant of the frame if points must be moved, that is, if some picture was taken at another time.
+    /// Returns the instant of the frame if points must be moved, that is, if any picture was taken at another time.
     fn instant(&self, answers: &[Option<ViewResult>]) -> Option<f64> {
         let is_off = answers.iter().flatten().any(|answer| answer.skew_s != 0.0);
         self.instant_s.filter(|_| is_off)
@@ -81,7 +81,7 @@ impl Motion {
     /// Returns the displacement of the points of a view between the instant of the frame and the time of the picture, in pixels;
     /// `None` if the picture was taken at the instant.
     ///
-    /// * `skew_s`: time of the picture after the instant; `taken_s`: time of the points after the instant, both in seconds.
+    /// * `skew_s`, `taken_s`: time of the picture and time of the points, both in seconds after the instant.
     pub(crate) fn since_instant(
         &mut self,
         view: usize,

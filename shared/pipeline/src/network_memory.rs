@@ -7,19 +7,20 @@ use statistics::Sorted;
 
 use crate::tracks::{Pace, Track, wider};
 
-/// Maximum distance of two joints that count as the same, as a share of the height of the network's window. The second constant is the
-/// share of common joints at which two sightings show the same person, with sides as labelled or exchanged.
+/// Maximum distance at which two joints count as the same, as a fraction of the height of the network's window. The next constant is the
+/// fraction of joints that two sightings of the same person have in common, with left and right as labelled or swapped.
 const SAME_JOINT: f64 = 0.05;
 const TWIN: f64 = 0.3;
-/// Within this share of the maximum gap between frames, nobody leaves the box of the last frame: a running person moves 0.2 m in 0.07 s.
+/// While a gap between frames is at most this fraction of the maximum gap, nobody leaves the box of the last frame: a running person moves
+/// 0.2 m in 0.07 s.
 const SOON: f64 = 1.0 / 6.0;
-/// Time for which a person who stands still is held without a look, as a share of the maximum gap between frames: a person who starts
-/// to walk moves 0.1 m in 0.13 s.
+/// Time for which the last sighting of a person who stands still is reused, as a fraction of the maximum gap between frames: a person who
+/// starts to walk moves 0.1 m in 0.13 s.
 const HELD: f64 = 1.0 / 3.0;
-/// An empty box is looked into again at the fourth search after it was found empty. Most empty boxes contain a chair or a poster, which
-/// stays in place.
+/// The network runs again on an empty box at the fourth search after the box was found empty. Most empty boxes contain a chair or a poster,
+/// which does not move.
 const LOOKED_AGAIN: u32 = 4;
-/// After this multiple of the maximum gap between frames (2 s), a person may be anywhere.
+/// After this multiple of the maximum gap between frames (2 s in total), a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
 /// State of the step from frame to frame: reusable memory, and the boxes of the people seen.
@@ -27,7 +28,7 @@ pub const LOST: f64 = 5.0;
 pub struct NetworkMemory {
     pub(crate) look: LookMemory,
     pub(crate) values: Vec<f32>,
-    /// Body parts of people in front of others.
+    /// Body parts that people in front hide.
     pub(crate) bars: Vec<Bar>,
     /// Where to look for the people of this frame in the next frame.
     pub(crate) tracks: Vec<Track>,
@@ -40,29 +41,29 @@ pub struct NetworkMemory {
     pub(crate) empty: Vec<Empty>,
     /// Number of frames until the next search for boxes; `None` before the first frame.
     pub(crate) until: Option<u64>,
-    /// Number of remaining frames with frequent searches. Such searches start when people are near each other, or when one of several
-    /// people is lost or found.
+    /// Number of frames for which frequent searches continue. Frequent searches start when people are near each other, or when one of
+    /// several people is lost or found.
     n_unsettled: u64,
     /// Number of the last frame, if known ([`Self::begin`]).
     last: Option<u64>,
     /// True if the last frame is so recent that nobody has left the box.
     pub(crate) is_soon: bool,
-    /// Number of frames since the last frame, and the maximum number of frames without a look at a person who stands still; `None` if the
-    /// frame rate is unknown.
+    /// Number of frames since the last frame, and the maximum number of frames for which a person who stands still is not looked at again;
+    /// `None` if the frame rate is unknown.
     pub(crate) hold: Option<Hold>,
-    /// Time since the last frame as a multiple of the maximum gap between frames, if it is more than 1. People are then first
-    /// looked for around their boxes.
+    /// Time since the last frame, as a multiple of the maximum gap between frames, if it is more than 1. People are then first searched for
+    /// around their boxes.
     pub(crate) apart: Option<f64>,
     /// True if this frame was searched for people.
     pub(crate) has_searched: bool,
 }
 
-/// How long a person who stands still can be held without a look.
+/// How long the last sighting of a person who stands still can be reused.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hold {
     /// Number of frames from the last frame to this frame.
     pub(crate) gap: u64,
-    /// Maximum number of frames from one look to the next.
+    /// Maximum number of frames between two runs of the network on a person.
     pub(crate) most: u64,
 }
 
@@ -71,16 +72,16 @@ pub(crate) struct Hold {
 pub(crate) struct Empty {
     /// The box, in pixels: left, top, right, bottom.
     pub(crate) outline: [f64; 4],
-    /// Number of searches since then.
+    /// Number of searches since the box was found empty.
     pub(crate) n_searches: u32,
 }
 
 /// A person in a frame.
 #[derive(Debug, Default)]
 pub(crate) struct Seen {
-    /// Where to look for the person next; `None` if the person was just looked at.
+    /// Where to look for the person next; `None` if the network has just run on the person.
     pub(crate) next: Option<Track>,
-    /// Pace of the person, as in [`Track`].
+    /// Velocity of the person, as in [`Track`].
     pub(crate) pace: Option<Pace>,
     pub(crate) maps: JointMaps,
     pub(crate) outline: [f64; 4],
@@ -102,18 +103,18 @@ impl NetworkMemory {
         &self.seen[..self.n_seen]
     }
 
-    /// Iterates over the network's maps of the people of this frame, the largest and best seen first.
+    /// Iterates over the network's maps of the people of this frame; the largest and clearest people come first.
     pub fn maps(&self) -> impl Iterator<Item = &JointMaps> {
         self.people().iter().map(|person| &person.maps)
     }
 
-    /// Returns the heat of the person who is seen best in this frame, 0 to 1; 0 if there is nobody.
+    /// Returns the heat of the person who is most clearly visible in this frame, 0 to 1; 0 if nobody is visible.
     pub(crate) fn best_heat(&self) -> f64 {
         let heats = self.people().iter().map(|known| known.heat);
         heats.fold(0.0, f64::max)
     }
 
-    /// Returns memory for a look and for one more person of this frame.
+    /// Returns memory for a run of the network, and for one more person of this frame.
     pub(crate) fn next(&mut self) -> (&mut LookMemory, &mut Seen) {
         if self.seen.len() == self.n_seen {
             self.seen.push(Seen::default());
@@ -121,7 +122,7 @@ impl NetworkMemory {
         (&mut self.look, &mut self.seen[self.n_seen])
     }
 
-    /// Counts a search for every empty box, and forgets the boxes that are due for another look.
+    /// Counts one more search for every empty box, and forgets the boxes that must be looked into again.
     pub(crate) fn age_empty_boxes(&mut self) {
         self.empty.retain_mut(|empty| {
             empty.n_searches += 1;
@@ -129,14 +130,14 @@ impl NetworkMemory {
         });
     }
 
-    /// Keeps only the people of this frame who are seen largest and best.
+    /// Keeps only the largest and clearest people of this frame.
     pub(crate) fn keep_largest(&mut self, n_most: usize) {
         let size = |seen: &Seen| seen.heat * (seen.outline[3] - seen.outline[1]);
         self.seen[..self.n_seen].sort_by(|a, b| size(b).total_cmp(&size(a)));
         self.n_seen = self.n_seen.min(n_most);
     }
 
-    /// Notes whether people are near each other in this frame, or their number changed.
+    /// Starts frequent searches if people are near each other in this frame, or if their number has changed.
     ///
     /// * `n_before`: number of people in the previous frame.
     /// * `n_frames`: number of frames with frequent searches after such an event.
@@ -164,9 +165,9 @@ impl NetworkMemory {
         self.n_unsettled > 0
     }
 
-    /// Begins a frame. If the last frame is long ago, because frames were dropped or lost, people are first looked for around their old
-    /// boxes. If it is very long ago, the whole picture is searched, unless the last frame was searched as well. Otherwise, a slow search
-    /// could cause a search in every frame.
+    /// Begins a frame. If the last frame is long ago, because frames were dropped or lost, people are first searched for around their old
+    /// boxes. If it is very long ago, the whole picture is searched, unless it was already searched in the last frame. Without this
+    /// exception, slow searches could delay frames so much that every frame is searched.
     ///
     /// * `frame`: number of the frame.
     /// * `most_apart`: maximum number of frames after which people can still be expected in their boxes.
@@ -181,7 +182,7 @@ impl NetworkMemory {
         });
         self.apart = share.filter(|share| *share > 1.0);
         if share.is_some_and(|share| share > LOST) && !self.has_searched {
-            // The first frame is searched in any case, and sets its own phase.
+            // The first frame is searched in any case, and determines which later frames are searched.
             self.until = self.until.map(|_| 0);
         }
         self.last = Some(frame);
@@ -199,9 +200,9 @@ impl NetworkMemory {
 }
 
 impl Seen {
-    /// Checks a person who was looked at; returns true if the person is seen well and is inside the frame.
+    /// Checks a person on whom the network has run; returns true if the person is clearly visible and inside the frame.
     ///
-    /// * `size`: width and height of the frame; `least_heat`: minimum mean heat of the joints of a person who is seen well, 0 to 1.
+    /// * `size`: width and height of the frame; `least_heat`: minimum mean heat of the joints of a clearly visible person, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
         self.next = None;
         self.heat = self.maps.heat();
@@ -209,13 +210,14 @@ impl Seen {
     }
 }
 
-/// Returns true if the person at index `n` is one of the `n` people before: two boxes can show the same person.
+/// Returns true if the person at index `n` is the same as one of the `n` people before in the list. This occurs because two boxes can show
+/// the same person.
 pub(crate) fn is_known(seen: &[Seen], n: usize) -> bool {
     let (before, last) = seen[..=n].split_at(n);
     before.iter().any(|known| in_common(&known.maps, &last[0].maps) >= TWIN)
 }
 
-/// Returns the share of joints that two sightings have in common, with sides as labelled or exchanged.
+/// Returns the fraction of joints that two sightings have in common, with left and right as labelled or swapped.
 fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     let [_, top, _, bottom] = first.extent();
     let near = SAME_JOINT * (bottom - top);
@@ -247,7 +249,7 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Returns the displacement of a whole person from one sighting to another, as a share of the height of the first window. It is the median
-/// over the joints along each axis, so errors of single joints have little effect.
+/// over the joints along each axis, so that errors of single joints have little effect.
 pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();
     let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));

@@ -1,8 +1,8 @@
-//! The single-view step with a network: pixels in, people and the maps of their joints out.
+//! The single-view step with a network: turns a picture into people and the maps of their joints.
 //!
-//! A network that looks at one person needs a box. While a person is seen well, the box for the next frame is the widened box of the pose.
-//! From time to time, and if nobody is seen well, a detector searches for boxes. Keypoints found by another program go through the same
-//! step, without a picture.
+//! A network that finds the joints of one person needs a box around that person. While a person is clearly visible, the box for the next
+//! frame is the widened box of the pose. From time to time, and whenever nobody is clearly visible, a detector searches for boxes.
+//! Keypoints found by another program go through the same step, without a picture.
 
 use kernels::Rgb8View;
 use keypoints::{Keypoint, Way};
@@ -22,7 +22,7 @@ use crate::view_result::ExtraKeypoint;
 /// Source of the positions of people's joints.
 #[derive(Debug)]
 pub enum Eyes {
-    /// A network that looks into boxes, and the person detector that finds the boxes.
+    /// A network that finds the joints of the person in a box, and the person detector that finds the boxes.
     Network(Box<PoseNetwork>, Box<Detector>),
     /// Keypoints found by another program, with the rules that derive the joints from them (`keypoints::joint_ways` of their names).
     Keypoints(Vec<Vec<Way>>),
@@ -33,17 +33,17 @@ pub enum Eyes {
 pub struct NetworkSettings {
     /// Maximum number of people per view; each person costs a run of the network.
     pub n_people: usize,
-    /// Number of frames from one search for boxes to the next. Every frame in which nobody is seen well is searched, too.
+    /// Number of frames from one search for boxes to the next. Frames in which nobody is clearly visible are always searched.
     pub find_every: u64,
-    /// Search interval while people are near each other, and for [`Self::find_every`] frames afterwards. A briefly hidden person is then
-    /// found again soon. It also applies after one of several people was lost or found.
+    /// Search interval while people are near each other, and for [`Self::find_every`] frames afterwards, so that a person who was hidden
+    /// briefly is soon found again. It also applies after one of several people was lost or found.
     pub find_every_of_several: u64,
-    /// Number of frames by which the second regular search is earlier. With different phases, the views do not all search in the same
-    /// frame.
+    /// Number of frames by which the second regular search comes early. With different values for different views, the views do not all
+    /// search in the same frame.
     pub find_phase: u64,
-    /// Minimum mean heat of the joints of a person who is seen well, 0 to 1.
+    /// Minimum mean heat of the joints of a clearly visible person, 0 to 1.
     pub least_heat: f64,
-    /// Settings for turning maps into evidence.
+    /// Settings that control how maps are turned into evidence.
     pub maps: MapSettings,
     /// Standard deviation of keypoints found by another program, as a share of the height of the person's box enlarged by a quarter.
     pub keypoint_sigma: f64,
@@ -94,7 +94,7 @@ impl NetworkStep {
         }
     }
 
-    /// Adds the keypoints that are not joints; every candidate then has them.
+    /// Adds keypoints that are not joints; every candidate then includes them.
     ///
     /// * `extras`: for every wanted keypoint, its index in the order of the card or of the file; `None` if the card or file does not have
     ///   it.
@@ -108,12 +108,12 @@ impl NetworkStep {
         self.size
     }
 
-    /// Looks at a frame, and stores the result in the memory ([`Self::sightings`], [`Self::evidence`]).
+    /// Finds the people in a frame, and stores the result in the memory ([`Self::sightings`], [`Self::evidence`]).
     ///
-    /// People who stand still are held. In a frame with a search, the detector's boxes come before the boxes of the previous frame, so that
-    /// a box that shrinks or drifts is noticed. A person whose pose was much worse than usual is also looked at in a wider box, and the
-    /// better sighting is kept. The step looks at up to twice as many people as it keeps, and keeps the largest. While a person is seen,
-    /// empty boxes are skipped in some searches.
+    /// For people who stand still, the last sighting is reused. In a frame with a search, the detector's boxes come before the boxes of the
+    /// previous frame, so that a box that shrinks or drifts is noticed. For a person whose pose was much worse than usual, the network also
+    /// runs on a wider box, and the better sighting is kept. The network runs on up to twice as many people as are kept; the largest are
+    /// kept. While a person is visible, boxes in which nobody was found are skipped in some searches.
     ///
     /// # Errors
     ///
@@ -186,7 +186,7 @@ impl NetworkStep {
         memory.until = until.map(|left| left.saturating_sub(1));
     }
 
-    /// Takes the people of a frame from keypoints found by another program; they are stored in the memory as after [`Self::look`].
+    /// Uses the people and keypoints that another program found in a frame; they are stored in the memory as after [`Self::look`].
     ///
     /// * `people`: keypoints of every person, in pixels of the frame.
     pub fn take<P: AsRef<[Option<Keypoint>]>>(
@@ -222,13 +222,13 @@ impl NetworkStep {
         -MUCH_WORSE * self.settings.maps.floor()
     }
 
-    /// Returns the people of the frame, the largest and best seen first. Stores where to look for them in the next frame.
+    /// Returns the people of the frame, the largest and clearest first. Stores where to look for them in the next frame.
     pub fn sightings(&self, memory: &mut NetworkMemory) -> Vec<Sighting> {
         let n_seen = memory.n_seen;
         let mut people = Vec::with_capacity(n_seen);
         for (nth, seen) in memory.seen[..n_seen].iter_mut().enumerate() {
             let score = seen.maps.score(&self.settings.maps);
-            // A held person already has a track.
+            // A person whose sighting was reused already has a track.
             if seen.next.is_none() {
                 self.track(seen, score);
             }
@@ -254,7 +254,7 @@ impl NetworkStep {
         people.filter_map(|seen| seen.maps.evidence())
     }
 
-    /// Plans where to look next for a person who was looked at.
+    /// Plans where to look next for a person on whom the network has run.
     fn track(&self, seen: &mut Seen, score: f32) {
         let before = ((seen.outline, seen.turn), seen.usual_score);
         let around = seen.maps.around();
@@ -275,7 +275,7 @@ impl NetworkStep {
     }
 }
 
-/// Returns the evidence of the direction in which a person faces; no evidence for a person seen head down in a picture that was not
+/// Returns the evidence of the direction in which a person faces. There is none for a person who is upside down in a picture that was not
 /// rotated.
 fn front_of(sighting: &Sighting, seen: &Seen) -> FrontEvidence {
     let is_told = seen.turn != Turn::Up || sighting.trunk_upward().is_none_or(|up| up > 0.0);

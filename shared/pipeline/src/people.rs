@@ -1,4 +1,4 @@
-//! Finds the people that the views of a frame may show. Each person consists of candidates of different views that are one person in space.
+//! Finds the people in a frame. Each person is a group of candidates, at most one per view, that show the same person in space.
 
 use geometry::{Camera, Ray};
 use multiview::ViewPlan;
@@ -6,15 +6,15 @@ use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::view_result::ViewResult;
 
-/// Pairs of parts whose means are points of the midline of the body: head, neck, hips, knees, ankles. These points do
-/// not depend on which side is labelled left.
+/// Pairs of parts whose means are points of the midline of the body: head, neck, hips, knees, ankles. These points are the same whichever
+/// side is labelled left.
 const LINE: [[usize; 2]; N_POINTS] = [[0, 0], [1, 1], [9, 21], [11, 23], [13, 25]];
 const N_POINTS: usize = 5;
 /// Indices of the neck and of the hips in `LINE`.
 const NECK: usize = 1;
 const HIPS: usize = 2;
-/// Minimum and maximum distance of successive points, in metres: wide enough for a three-year-old child and a tall man. The
-/// midpoint between two knees may be anywhere between the legs.
+/// Minimum and maximum distance of successive points, in metres: wide enough for both a three-year-old child and a tall man. The midpoint
+/// between two knees may be anywhere between the legs.
 const LENGTHS: [[f64; 2]; N_POINTS - 1] = [[0.05, 0.5], [0.2, 0.8], [0.0, 0.7], [0.0, 0.7]];
 
 /// Maximum mean distance of a candidate's points from the projected person, as a share of the candidate's size in the picture.
@@ -25,11 +25,11 @@ const SAME: f64 = 0.15;
 const APART_M: f64 = 0.5;
 /// Maximum distance between two rays to the same point, in metres: twice the tolerance for the size of a body.
 const MAX_GAP_M: f64 = 0.5;
-/// Maximum number of rounds of searching for more views.
+/// Maximum number of rounds in which further views of a person are searched for.
 const MAX_ROUNDS: usize = 3;
-/// Minimum determinant of the normal matrix of the rays: two rays 3 degrees apart have 0.005.
+/// Minimum determinant of the normal matrix of the rays. For comparison, two rays 3 degrees apart have a determinant of 0.005.
 const MIN_SPREAD: f64 = 0.002;
-/// Minimum number of views that must agree; in a smaller rig, all views must agree.
+/// Minimum number of views that must agree on a person; in a smaller rig, all views must agree.
 const MIN_VIEWS: usize = 3;
 /// Minimum strength of a person, as a share of the strength of the strongest person.
 const MIN_STRENGTH: f64 = 0.28;
@@ -39,13 +39,13 @@ const MIN_STRENGTH: f64 = 0.28;
 pub(crate) struct Person {
     /// The candidate of every view; `None` for a view without a candidate.
     pub candidates: Vec<Option<usize>>,
-    /// Midline of the body (head, neck, hips, knees, ankles) in every picture that shows all of it, in pixels of the
-    /// frame.
+    /// Midline of the body (head, neck, hips, knees, ankles) in each picture that contains all of it, in pixels of the frame.
     pub lines_px: Vec<Option<Line>>,
-    /// Middle of the trunk, in metres in the world.
+    /// Centre of the trunk in the world, in metres.
     pub place: Point3<f64>,
-    /// Sum over the views of how clearly they see the person. Each view contributes the amount by which its candidate's score exceeds the
-    /// scores of the weakest third of the view's candidates. The contribution shrinks with the distance from the projected person.
+    /// Sum, over the views, of how clearly each sees the person. A view contributes the amount by which its candidate's score exceeds the
+    /// scores of the weakest third of the view's candidates. The contribution shrinks with the distance of the candidate from the projected
+    /// person.
     pub strength: f64,
     /// Size in the pictures, in pixels of the frame: longer side of the rectangle around the parts, averaged over the views
     /// that see the person.
@@ -90,14 +90,14 @@ impl FoundBody {
         [0, 1].map(|axis| f64::midpoint(neck[axis], hips[axis]))
     }
 
-    /// Returns true if the body lies on the midline of a person in the picture.
+    /// Returns true if the body coincides with the midline of a person in the picture.
     fn is_on(&self, line: &Line) -> bool {
         let middle = self.middle();
         let mut bones = line.array_windows();
         bones.any(|[a, b]| distance_to_segment(middle, *a, *b) < SAME * self.size_px)
     }
 
-    /// Returns the mean distance of the points from the projected points of a person, as a share of the size.
+    /// Returns the mean distance of the points from the projected points of a person, as a fraction of the size of the body.
     fn distance(&self, projected: &Line) -> f64 {
         let each = self.points_px.iter().zip(projected);
         let sum: f64 = each.map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).sum();
@@ -114,7 +114,7 @@ pub(crate) struct Found {
 impl Found {
     /// Returns the candidates of every view that show a person other than the followed one, as bit sets.
     ///
-    /// A view that sees only other people leaves nothing out: the followed person may be hidden there, or badly found.
+    /// Views that see only other people are not included: the followed person may be hidden there, or poorly detected.
     ///
     /// * `followed`: index of the followed person; `None` if the person was not found.
     pub(crate) fn others(&self, followed: Option<usize>) -> Vec<u64> {
@@ -153,13 +153,13 @@ impl Found {
     }
 }
 
-/// Finds the people of a frame; the person whom most views see most clearly comes first.
+/// Finds the people of a frame; the person seen most clearly by the most views comes first.
 ///
-/// Each pair of candidates of two views is placed in space by the midlines. A plausible person is searched for in the other views until
-/// nothing changes. The strongest group is the first person. Each other group is a person if it is apart from all earlier people in space,
-/// and in all pictures except at most one. A person must be seen by three views, or by both views of a rig with two, and be at least 0.28
-/// times as strong as the first. People whose trunks are less than half a metre apart count as one. The paper assumes one person; this
-/// method is our own.
+/// For each pair of candidates of two views, a person is triangulated from the two midlines. A plausible person is then searched for in the
+/// other views until nothing changes. The strongest group is the first person. Each other group is a further person if it is separate from
+/// all earlier people, both in space and in all pictures but at most one. A person must be seen by three views, or by both views of a rig
+/// with two, and be at least 0.28 times as strong as the first. People whose trunks are less than half a metre apart count as one. The
+/// paper assumes one person; this method is our own.
 ///
 /// * `cameras`, `views`: the cameras of the views, and the candidates of each view.
 pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
@@ -167,7 +167,7 @@ pub(crate) fn find(cameras: &[&Camera], views: Vec<Vec<FoundBody>>) -> Found {
     Found { views, people }
 }
 
-/// Returns all groups on which enough views agree; the same person occurs many times.
+/// Returns all groups on which enough views agree; the same person occurs in many of them.
 fn groups(cameras: &[&Camera], views: &[Vec<FoundBody>]) -> Vec<Person> {
     let n_present = views.iter().filter(|view| !view.is_empty()).count();
     let needed = MIN_VIEWS.min(n_present).max(2);
@@ -207,7 +207,7 @@ fn distinct(views: &[Vec<FoundBody>], mut found: Vec<Person>) -> Vec<Person> {
     kept
 }
 
-/// Returns true if two people are different: they are apart in space, and share a place in at most one picture.
+/// Returns true if two people are different: they are separate in space, and overlap in at most one picture.
 fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     let shared = views.iter().enumerate().filter(|(view, sightings)| {
         let line = one.lines_px[*view].as_ref();
@@ -219,7 +219,7 @@ fn differ(views: &[Vec<FoundBody>], one: &Person, other: &Person) -> bool {
     (one.place - other.place).norm() >= APART_M && n_shared <= 1 && own >= 2
 }
 
-/// Returns true if the rays to the necks, and those to the hips, are close enough for the two bodies to be one person.
+/// Returns true if two bodies can be the same person: the rays to the necks, and the rays to the hips, are close enough to each other.
 fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     [NECK, HIPS].into_iter().all(|point| {
         let (Some(a), Some(b)) = (&one.rays[point], &other.rays[point]) else {
@@ -230,7 +230,7 @@ fn may_meet(one: &FoundBody, other: &FoundBody) -> bool {
     })
 }
 
-/// Returns the person that two candidates would form, with the candidates of the other views that match.
+/// Returns the person formed by two candidates together with the matching candidates of the other views.
 ///
 /// * `rays`: a buffer.
 fn person<'a>(
@@ -240,7 +240,7 @@ fn person<'a>(
     rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
     let mut seen = placed(cameras, views, candidates, rays)?;
-    // Views found later move the person; more views may then match.
+    // Each added view moves the person, so more views may match then.
     for _ in 0..MAX_ROUNDS {
         if seen.candidates == *candidates {
             return Some(seen);
@@ -251,7 +251,7 @@ fn person<'a>(
     Some(seen)
 }
 
-/// Returns the person in space formed by these candidates, with the candidate of each view at the projection of the person.
+/// Returns the person in space formed by these candidates, with each view's candidate nearest to the projection of the person.
 fn placed<'a>(
     cameras: &[&Camera],
     views: &'a [Vec<FoundBody>],
@@ -342,7 +342,7 @@ fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     (point - (a + along * share.clamp(0.0, 1.0))).norm()
 }
 
-/// Returns the candidates of a view for the paper's method; empty if the model does not have the parts of the published models.
+/// Returns the candidates of a view for the paper's method; empty if the model's parts are not those of the published models.
 pub(crate) fn bodies_of_poses(plan: &ViewPlan, answer: Option<&ViewResult>) -> Vec<FoundBody> {
     let is_body = plan.model().n_parts() == skeleton::N_PARTS;
     let Some(answer) = answer.filter(|_| is_body) else {

@@ -1,4 +1,4 @@
-//! Evidence of a view for the joints of one person: the maps of a network near the seen joints.
+//! Evidence of a view for the joints of one person: the network's maps near the joints that were found.
 
 use multiview::JointEvidence;
 use nalgebra::Vector2;
@@ -7,7 +7,7 @@ use posenetwork::PersonMaps;
 use crate::placed::N;
 use crate::sighting::Sighting;
 
-/// Maximum number of places that a view offers for a joint.
+/// Maximum number of candidate positions that a view offers for a joint.
 const N_MAXIMA: usize = 3;
 /// Margin around the box of the joints within which the person is searched for, as a share of the box's longer side.
 const BEYOND: f64 = 0.3;
@@ -18,7 +18,8 @@ pub(crate) struct PersonEvidence<'a> {
     /// Part of the picture where the person may be, in pixels: left, top, right, bottom.
     near: [f64; 4],
     maxima: Vec<Vec<([f64; 2], f32)>>,
-    /// Displacement of every joint between the instant of the frame and the time of the picture, in pixels; empty if both are the same.
+    /// Displacement of every joint between the instant of the frame and the time of the picture, in pixels; empty if the two times are the
+    /// same.
     since_instant: Vec<Vector2<f64>>,
     /// Height of the network's window around the person, in pixels.
     pub(crate) window_px: f64,

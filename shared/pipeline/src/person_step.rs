@@ -1,4 +1,4 @@
-//! Solves one person in space from the network maps of all views, which it reads in place.
+//! Solves for one person in 3D from the network maps of all views, which are read without copying.
 
 use std::sync::Arc;
 
@@ -22,11 +22,11 @@ use crate::skeleton_step::{Kept, Skeleton};
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// Minimum number of joints of a person that two views must see well; half of a person is often hidden. Measured: in six empty rooms, the
-/// seventh best joint had a heat of at most 0.41 in two views. With people who stood, sat or ran in front of three or four cameras, it had
-/// at least 0.58.
+/// Minimum number of joints that two views must see clearly; it is low because half of a person is often hidden. In measurements in six
+/// empty rooms, the joint with the seventh highest heat in two views had a heat of at most 0.41. With people who stood, sat or ran in front
+/// of three or four cameras, its heat was at least 0.58.
 const WELL_SEEN: usize = 7;
-/// Minimum number of a person's joints that a view must see to contribute.
+/// Minimum number of a person's joints that a view must see; otherwise, the view does not contribute.
 const SEEN: usize = 3;
 
 /// Data that does not change from frame to frame.
@@ -47,7 +47,7 @@ pub(crate) struct FrameViews<'f, 'a> {
     pub(crate) people: &'f FramePeople,
 }
 
-/// The step for one person; remembers sides, bone lengths and motion from the earlier frames.
+/// Solves for one person; remembers left and right, bone lengths and motion from the earlier frames.
 #[derive(Debug)]
 pub(crate) struct PersonStep {
     rig: Arc<Rig>,
@@ -59,14 +59,14 @@ pub(crate) struct PersonStep {
     solved: Motion,
 }
 
-/// A person in the views of a frame.
+/// A person as one view of the frame shows them.
 struct Shown<'a> {
     view: usize,
     front: FrontEvidence,
     evidence: PersonEvidence<'a>,
 }
 
-/// A solution with its sides.
+/// A solution, and the decision about its left and right.
 struct Solution<'a> {
     places: Places,
     energy: f64,
@@ -94,8 +94,8 @@ impl PersonStep {
     /// Solves for the person in a frame.
     ///
     /// * `nth`: index of the person among the people of the frame.
-    /// * Returns a skeleton without joints if fewer than two views show the person. False detections in an empty room do not agree in
-    ///   two views.
+    /// * Returns a skeleton without joints if fewer than two views show the person. For example, false detections in an empty room do not
+    ///   agree between views.
     pub(crate) fn run(&mut self, frame: &FrameViews<'_, '_>, nth: usize) -> Skeleton {
         let FrameViews {
             answers, people, ..
@@ -178,7 +178,7 @@ impl PersonStep {
         shown
     }
 
-    /// Solves for the person; `None` if fewer than two views show the person well.
+    /// Solves for the person; `None` if fewer than two views see the person clearly.
     fn solve<'a>(
         &mut self,
         plans: &'a [Arc<ViewPlan>],
@@ -217,7 +217,7 @@ impl PersonStep {
         Some(self.with_sides(&found, used))
     }
 
-    /// Decides left and right of the whole body, if the views label sides as they appear in the picture.
+    /// Decides left and right of the whole body, if the views name left and right as they appear in the picture.
     fn with_sides<'a>(
         &mut self,
         found: &SolvedPerson,
@@ -248,7 +248,7 @@ impl PersonStep {
         }
     }
 
-    /// Returns true if two views see enough joints of a solution well.
+    /// Returns true if two views see enough joints of a solution clearly.
     fn is_well_seen(&self, found: &SolvedPerson, views: &[PartView<'_>]) -> bool {
         let is_seen = |joint: &usize| {
             let heats = views.iter().map(|view| self.heat_of(*joint, found, view));
@@ -266,7 +266,7 @@ impl PersonStep {
         })
     }
 
-    /// Returns true if a view shows the person of a solution at all. A view of something else provides no evidence of the person, and
+    /// Returns true if a view shows the person of a solution at all. If it shows something else, it provides no evidence of the person, and
     /// its pixels do not belong to the person.
     fn shows(&self, found: &SolvedPerson, view: &PartView<'_>) -> bool {
         let heats = (0..N).map(|joint| self.heat_of(joint, found, view));
@@ -308,8 +308,8 @@ fn front_seen(sighting: &Sighting) -> FrontEvidence {
     if !sighting.front.iter().all(|number| number.is_finite()) {
         return FrontEvidence::default();
     }
-    // The network saw a person in a handstand upright, because the picture was rotated. For a lying person, the network's evidence says
-    // nothing about up and down in the picture.
+    // A person in a handstand looks upright to the network, because the picture was rotated. For a lying person, the network's evidence
+    // says nothing about up and down in the picture.
     let weight = sighting.trunk_upward().unwrap_or(1.0).powi(2) as f32;
     sighting.front.map(|told| weight * told)
 }

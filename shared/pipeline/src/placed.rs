@@ -1,4 +1,4 @@
-//! Converts a person in space to the joints and views of a result.
+//! Converts a person solved in 3D to the joints and views of a result.
 
 use geometry::{MAX_VIEWS, TriangulateError, Triangulated};
 use multiview::{FusedPose, SpaceView, ViewPlan};
@@ -19,15 +19,15 @@ pub(crate) type Places = [Option<Point3<f64>>; N];
 pub(crate) struct PartView<'a> {
     /// Index of the view in the rig.
     pub(crate) view: usize,
-    /// Evidence of the view, with the sides named as in the solution.
+    /// Evidence of the view, with left and right named as in the solution.
     pub(crate) shown: SpaceView<'a>,
     /// Height of the network's window around the person, in pixels.
     pub(crate) window_px: f64,
 }
 
 impl PartView<'_> {
-    /// Returns the expected error of a joint in the view, in pixels along one axis, from the heat at the solution; `None` if the view does
-    /// not show the place.
+    /// Returns the expected error of a joint in the view, in pixels along one axis, derived from the heat at the solution; `None` if the
+    /// view does not show that position.
     fn sigma_px(&self, maps: &MapSettings, joint: usize, at: &Point3<f64>) -> Option<f64> {
         let pixel = self.shown.camera.project(at)?;
         let [width, height] = self.shown.camera.intrinsics.size.map(f64::from);
@@ -37,9 +37,9 @@ impl PartView<'_> {
     }
 }
 
-/// Returns the joints at the places of a solution, each with its covariance. The covariance is the inverse of the curvature
-/// `sum_v J_v^T J_v / s_v^2`. `J_v` is the derivative of the pixel in view `v` with respect to the place, and `s_v` is the error expected
-/// for the heat at that pixel.
+/// Returns the joints at the positions of a solution, each with its covariance. The covariance is the inverse of the curvature `sum_v J_v^T
+/// J_v / s_v^2`. `J_v` is the derivative of the projection in view `v` with respect to the position, and `s_v` is the error expected for
+/// the heat at that pixel.
 ///
 /// [`crate::disagreement`] sets the residuals and their root mean square.
 pub(crate) fn joints_at(
@@ -77,7 +77,7 @@ pub(crate) fn joints_at(
     places.iter().enumerate().map(joint).collect()
 }
 
-/// Returns the joints of a set: each is the mean of the joints of `skeleton::PARSE14` that have its parts.
+/// Returns the joints of another joint set: each is the mean of the joints of `skeleton::PARSE14` that have the same parts.
 pub(crate) fn of_set(
     set: &JointSet,
     of_body: &[Result<Triangulated, TriangulateError>],
@@ -113,9 +113,9 @@ pub(crate) fn of_set(
     set.joints.iter().map(mean).collect()
 }
 
-/// Returns where a view shows the parts of a person.
+/// Returns the positions of a person's parts in a view.
 ///
-/// * `places`: places of the joints of `skeleton::PARSE14`.
+/// * `places`: positions of the joints of `skeleton::PARSE14`.
 /// * `energy`: energy of the solution.
 /// * `single_score`: score of the best candidate of the view.
 pub(crate) fn shown_in(
@@ -148,13 +148,13 @@ pub(crate) fn shown_in(
 
 /// Position of a part between two joints.
 pub(crate) struct Between {
-    /// The next joint towards the head, and the next one away from it.
+    /// The nearest joint towards the head, and the nearest joint away from it.
     pub(crate) joints: [usize; 2],
     /// Position between the two joints as a fraction, 0 to 1.
     pub(crate) share: f64,
 }
 
-/// Returns the joint of a part, as an index in `skeleton::PARSE14`; `None` for a part between joints.
+/// Returns the joint at a part, as an index in `skeleton::PARSE14`; `None` if the part lies between joints.
 fn joint_of(part: usize) -> Option<usize> {
     PARSE14.joints.iter().position(|joint| joint.parts == [part])
 }

@@ -8,7 +8,7 @@ use skeleton::{JointSet, N_PARTS, PARSE14, SIDES};
 use crate::placed::{N, between};
 use crate::view_result::ExtraKeypoint;
 
-/// Minimum heat of a joint that counts for the position of its person, 0 to 1.
+/// Minimum heat (0 to 1) at which a joint is used to compute the person's position.
 const FAINT: f32 = 0.02;
 
 /// A person as seen by one view. Left and right are named as by the network or the other program.
@@ -31,14 +31,14 @@ pub struct Sighting {
 /// The people that one view sees in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sightings {
-    /// The people, the largest and best seen first; never empty.
+    /// The people, the largest and clearest first; never empty.
     pub people: Vec<Sighting>,
     /// Time of the picture after the instant of the frame, in seconds; negative if it was taken before.
     pub skew_s: f64,
 }
 
 impl Sighting {
-    /// Creates a person from the peaks of maps.
+    /// Creates a person from the peaks of the network's maps.
     pub(crate) fn new(peaks: &[Option<Keypoint>], score: f32) -> Self {
         let peak = |joint: usize| peaks.get(joint).copied().flatten();
         let heat = |joint: usize| peak(joint).map_or(0.0, |peak| peak.score.clamp(0.0, 1.0) as f32);
@@ -56,9 +56,9 @@ impl Sighting {
         }
     }
 
-    /// Returns true if half of the joints are seen well. False sightings in an empty room have fewer.
+    /// Returns true if half of the joints are clearly visible. False detections in an empty room have fewer clear joints.
     ///
-    /// * `least_heat`: minimum heat of a joint that is seen well, 0 to 1.
+    /// * `least_heat`: minimum heat of a clearly visible joint, 0 to 1.
     pub fn is_clear(&self, least_heat: f64) -> bool {
         let well = self.heats.iter().filter(|heat| f64::from(**heat) >= least_heat);
         well.count() >= N / 2
@@ -105,7 +105,7 @@ impl Sighting {
     }
 }
 
-/// Returns the parts of the paper's body; some of them lie between two joints.
+/// Returns the parts of the paper's body model; some of them lie between two joints.
 ///
 /// * `joints`: positions of the joints of `skeleton::PARSE14`, in any plane.
 pub fn parts_of(joints: &[[f64; 2]; PARSE14.joints.len()]) -> Vec<[f64; 2]> {

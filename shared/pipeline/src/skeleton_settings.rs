@@ -11,7 +11,7 @@ pub enum Combine {
     /// The mean of the poses: the paper's section 7.
     #[default]
     Mean,
-    /// For every part, the result that is consistent over all views ([`multiview::consensus()`]).
+    /// For every part, the result that is consistent across all views ([`multiview::consensus()`]).
     Consensus,
 }
 
@@ -24,13 +24,13 @@ pub struct BodySettings {
     pub prior: bool,
     /// Let the prior learn this person's bone lengths from the earlier frames.
     pub learn: bool,
-    /// Weight of the deviation of a skeleton from a human body when one of several assumptions is chosen: score per squared standard
-    /// deviation ([`skeleton::body::deviation`]).
+    /// Weight of a skeleton's deviation from a human body, when one of several assumptions is chosen: score per squared standard deviation
+    /// ([`skeleton::body::deviation`]).
     pub score: f64,
 }
 
 impl BodySettings {
-    /// Uses no knowledge about bodies: for models of something other than people.
+    /// Settings that use no knowledge about bodies, for models of something other than people.
     pub const NONE: Self = Self {
         check: false,
         prior: false,
@@ -61,27 +61,28 @@ pub struct SkeletonSettings {
     pub triangulation: geometry::Settings,
     /// Uncertainty of a joint in one view, in cells of the level on which the view was fused.
     pub sigma_cells: f64,
-    /// Weight of the predicted errors of a joint's parts, if available; they are added
-    /// to `sigma_cells` as variances. 0 ignores them.
+    /// Weight of the predicted errors of a joint's parts, if they are available. The weighted errors are added to `sigma_cells` as
+    /// variances; 0 ignores them.
     pub error_weight: f64,
     /// How the pose of a view is computed from the poses of its pairs.
     pub combine: Combine,
-    /// Settings for the agreement of the views on a part. The decision about facing always uses the consensus: a mean
-    /// of poses with different limbs is inconsistent under every assumption about left and right.
+    /// Settings for the agreement of the views on a part. The decision about which views see the person from behind always uses the
+    /// consensus, because the mean of poses that confuse limbs is inconsistent under every assumption about left and right.
     pub consensus: ConsensusSettings,
     /// How knowledge about human bodies is used.
     pub body: BodySettings,
-    /// Decide which views see the person from behind.
+    /// If true, decide which views see the person from behind.
     pub facing: bool,
     /// Settings for tracking over time which views see the person from the same side.
     pub facing_filter: FacingSettings,
-    /// How left and right of all views together are decided.
+    /// Settings for deciding left and right for all views together.
     pub sides: SidesSettings,
-    /// Weight of the agreement of all views in the decision about facing: score per squared cell of
+    /// Weight of the agreement of all views in the decision about which views see the person from behind: score per squared cell of
     /// distance between a part and its reprojection. This is the geometric term over all views.
     pub agreement: f64,
-    /// Weight of the views' front evidence in the decision about facing: score per nat. If the evidence fits neither the sides of a
-    /// skeleton nor the exchanged sides, some views are assumed to be on the wrong side.
+    /// Weight of the views' evidence of the direction in which the person faces, in the decision about which views see the person from
+    /// behind: score per nat. If the evidence fits neither the labels of a skeleton nor the swapped labels, left and right are assumed to
+    /// be wrong in some views.
     pub front_score: f64,
     /// Distance at which the penalty for disagreement is capped, in cells.
     pub max_distance_cells: f64,

@@ -22,13 +22,13 @@ use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
 
-/// The poses from which a skeleton was triangulated.
+/// Which poses a skeleton was triangulated from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kept {
     /// The poses solved by fusion.
     #[default]
     Solved,
-    /// The candidates from which fusion started, because they agree better with each other.
+    /// The candidates from which fusion started; they are used if they agree better with each other.
     Start,
 }
 
@@ -41,14 +41,14 @@ pub struct Skeleton {
     pub body: Option<Body>,
     /// The views of the rig; `None` for a view without a result.
     pub views: Vec<Option<FusedView>>,
-    /// Number of people that the views may show.
+    /// Number of people found in the views.
     pub n_people: usize,
     /// Number of pairs that were averaged.
     pub n_pairs: usize,
     /// Margin of the decision about which views see the person from the same side: energy of the chosen assumption minus
     /// that of the next best one.
     pub facing_margin: f64,
-    /// Exchange of left and right in all views; `None` if it is not decided.
+    /// Decision whether to swap left and right in all views; `None` if it was not made.
     pub sides: Option<Sides>,
     /// The poses from which the joints were triangulated.
     pub kept: Kept,
@@ -59,11 +59,11 @@ pub struct Skeleton {
 struct Frame<'a> {
     answers: &'a [Option<ViewResult>],
     fused: &'a Fused<'a>,
-    /// True if the views may show only this person.
+    /// True if no other person was found in the views.
     is_alone: bool,
 }
 
-/// The skeleton step for a rig; remembers the facing of the previous frame.
+/// The skeleton step for a rig; remembers which views saw the person from behind in the previous frame.
 #[derive(Debug)]
 pub struct SkeletonStep {
     space: Space,
@@ -152,7 +152,7 @@ impl SkeletonStep {
         let (at_instant, more_px) = self.at_instant(answers, &views);
         let mut expected_px = self.expected_errors(answers, exchanged, self.space.settings.joints);
         add(&mut expected_px, &more_px, self.space.settings.joints);
-        // The body check does not use expected errors.
+        // The check of the body does not use expected errors.
         let mut of_body_px = Vec::new();
         add(&mut of_body_px, &more_px, &PARSE14);
         let points = |centres: &[[f64; 2]]| match &self.space.settings.joint_map {
@@ -236,8 +236,8 @@ impl SkeletonStep {
         views.map(|view| of_view(view).unwrap_or_default()).collect()
     }
 
-    /// Returns the views that see the person from behind, the margin of the decision about which views see the
-    /// same side, and the decision about the sides of all views.
+    /// Returns the views that see the person from behind, the margin of that decision, and the decision about left and right for all views
+    /// together.
     fn decide_facing(&mut self, frame: &Frame<'_>) -> (Exchanges, f64, Sides) {
         let Frame { answers, fused, .. } = *frame;
         let present = answers.iter().enumerate().fold(0, |mask, (view, answer)| {
@@ -310,7 +310,7 @@ impl SkeletonStep {
         }
     }
 
-    /// Returns the poses from which fusion started; `None` for a view that was not fused.
+    /// Returns the poses from which fusion started; `None` for a view that did not take part in fusion.
     fn starts(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<FusedView>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
@@ -327,9 +327,10 @@ impl SkeletonStep {
         (0..self.space.plans.len()).map(of_view).collect()
     }
 
-    /// Returns the poses of every view under a facing assignment: one per pair, or the pose that was solved with all views.
+    /// Returns the poses of every view under an assumption about which views see the person from behind: one per pair, or the pose that was
+    /// solved with all views.
     ///
-    /// A view that was not fused keeps its own best pose, unless that pose may belong to another person.
+    /// A view that did not take part in fusion keeps its own best pose, unless that pose may belong to another person.
     fn candidates(&self, frame: &Frame<'_>, exchanged: Exchanges) -> Vec<Option<Candidates>> {
         let Frame { answers, fused, .. } = *frame;
         let of_view = |view: usize| {
@@ -387,7 +388,7 @@ impl SkeletonStep {
         views
     }
 
-    /// Returns the camera and uncertainty of a view, still without points.
+    /// Returns the camera and uncertainty of a view, without points.
     fn sightings<'a>(&self, view: Option<&FusedView>, plan: &'a ViewPlan) -> Sightings<'a> {
         let cell_px = view.map_or(1.0, |view| view.cell_px);
         Sightings {

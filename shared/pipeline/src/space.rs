@@ -1,4 +1,4 @@
-//! Judges in space the poses of all views under one assumption about their sides.
+//! Judges the poses of all views in 3D, under one assumption about which views have left and right swapped.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -63,7 +63,8 @@ impl Space {
         self.plans.first().is_some_and(has_sides)
     }
 
-    /// Returns the evidence for the sides of a skeleton: the front evidence of the views, and the bending of the joints.
+    /// Returns the evidence for left and right of a skeleton: the views' evidence of the direction in which the person faces, and the
+    /// bending of the joints.
     fn seen(
         &self,
         answers: &[Option<ViewResult>],
@@ -92,7 +93,7 @@ impl Space {
         Seen { front, log_ratio }
     }
 
-    /// Returns the evidence of a view about the person it was fused to, taken from the nearest candidate.
+    /// Returns a view's evidence of the direction in which its fused person faces, taken from the nearest candidate.
     fn front_evidence(
         &self,
         view: usize,
@@ -124,7 +125,7 @@ impl Space {
         let cap = self.settings.max_distance_cells.powi(2);
         let of_view = |residual_px: f64, view: &FusedView| {
             let cells = residual_px / view.cell_px;
-            // A view that cannot see the point counts with the maximum disagreement.
+            // A view that cannot see the point is given the maximum disagreement.
             if cells.is_nan() {
                 cap
             } else {
@@ -184,8 +185,8 @@ impl Space {
     }
 }
 
-/// Returns the weight of the front evidence of a view: the squared cosine of the angle between the trunk in the picture and the vertical; 0
-/// for a person upside down. The detector was not trained on the heads of people who bend.
+/// Returns the weight of a view's evidence of the direction in which the person faces: the squared cosine of the angle between the trunk in
+/// the picture and the vertical, or 0 for a person upside down. The detector was not trained on the heads of people who bend down.
 fn upright(centres_px: &[[f64; 2]]) -> f64 {
     let cosine = trunk_upward(centres_px);
     if cosine > 0.0 { cosine * cosine } else { 0.0 }
@@ -204,21 +205,22 @@ pub(crate) fn trunk_upward(centres_px: &[[f64; 2]]) -> f64 {
     -y / x.hypot(y)
 }
 
-/// Rating of an assumption about the sides of the views.
+/// Rating of an assumption about left and right in the views.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Judged {
-    /// Agreement of the views, and likelihood of their front evidence; added to the energy of fusion.
+    /// Agreement of the views, plus the likelihood of their evidence of the direction in which the person faces; added to the energy of
+    /// fusion.
     pub(crate) score: f64,
-    /// Evidence about the sides of the whole body.
+    /// Evidence about left and right of the whole body.
     pub(crate) seen: Seen,
 }
 
-/// Evidence for the sides of a skeleton.
+/// Evidence about left and right of a skeleton.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Seen {
     /// The direction in which the skeleton faces according to its labels.
     pub(crate) front: Option<Vector3<f64>>,
-    /// Log-likelihood ratio of the labels over the exchanged labels, in nats.
+    /// Log-likelihood ratio of the labels over the swapped labels, in nats.
     pub(crate) log_ratio: f64,
 }
 

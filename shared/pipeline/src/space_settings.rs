@@ -1,4 +1,4 @@
-//! Settings of the step in space.
+//! Settings of the step that solves for people in 3D.
 
 use multiview::{SidesSettings, SpaceSettings};
 use posenetwork::MapSettings;
@@ -10,9 +10,9 @@ use crate::skeleton_settings::BodySettings;
 /// Settings of the step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpaceStepSettings {
-    /// Settings of the energy in space and of its solution.
+    /// Settings of the energy in 3D and of its optimisation.
     pub space: SpaceSettings,
-    /// Settings by which the maps were turned into evidence.
+    /// Settings with which the network's maps were turned into evidence.
     pub maps: MapSettings,
     /// Minimum heat that half of a person's joints must have in two views, 0 to 1.
     pub least_heat: f64,
@@ -20,17 +20,18 @@ pub struct SpaceStepSettings {
     pub joints: &'static JointSet,
     /// How knowledge about human bodies is used.
     pub body: BodySettings,
-    /// How left and right of the whole body are decided if views label sides as they appear in the picture; `None` if the views
-    /// label the sides of the body.
+    /// Settings for deciding left and right of the whole body, if views name them as they appear in the picture; `None` if the views name
+    /// the person's own left and right.
     pub sides: Option<SidesSettings>,
 }
 
 impl SpaceStepSettings {
-    /// Returns the settings in space that match the settings of the views.
+    /// Returns the 3D settings that match the settings of the views.
     ///
-    /// * `least_heat`: minimum mean heat of the joints of a person who is seen in a view, 0 to 1. In space, the views must
-    ///   agree. A view that sees the person badly does not count, and half of the joints need twice this heat.
-    /// * `as_seen`: true if views label sides as they appear in the picture, so that the sides of the whole body must be decided.
+    /// * `least_heat`: minimum mean heat of the joints of a person who is seen in a view, 0 to 1. In 3D, views must agree: a view that sees
+    ///   the person poorly is ignored, and half of the joints need twice this heat.
+    /// * `as_seen`: true if views name left and right as they appear in the picture, so that left and right of the whole body must be
+    ///   decided.
     pub fn for_views(least_heat: f64, as_seen: bool) -> Self {
         let maps = MapSettings::default();
         Self {

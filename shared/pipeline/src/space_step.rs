@@ -1,4 +1,4 @@
-//! The step in space: computes the joints of people from the network maps of all views, which it reads in place.
+//! The step in 3D: computes the joints of people from the network maps of all views, which are read without copying.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
 
-/// Maximum number of people whose bone lengths and sides are remembered; the people who were seen longest ago are forgotten first.
+/// Maximum number of people whose bone lengths, left and right are remembered; the people who were seen longest ago are forgotten first.
 const MOST_REMEMBERED: usize = 32;
 
 /// A solved person of a frame.
@@ -33,7 +33,7 @@ struct Remembered {
     last: u64,
 }
 
-/// The step in space, for a rig whose views have network maps; remembers sides, bone lengths and motion of every person.
+/// The step in 3D, for a rig whose views have network maps; remembers left and right, bone lengths and motion of every person.
 #[derive(Debug)]
 pub struct SpaceStep {
     rig: Arc<Rig>,
@@ -100,7 +100,7 @@ impl SpaceStep {
         solved
     }
 
-    /// Returns the step of a person; a new person gets a new step.
+    /// Returns the step of a person; creates it for a new person.
     fn remembered(&mut self, id: u64) -> &mut PersonStep {
         let known = self.people.iter().position(|person| person.id == id);
         let index = known.unwrap_or_else(|| {

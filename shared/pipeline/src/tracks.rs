@@ -2,24 +2,25 @@
 
 use posenetwork::Turn;
 
-/// Share of the distance to the box around the pose by which a side moves inward per frame.
+/// Fraction of the distance to the box around the pose by which each side of the search box moves inward per frame.
 const INWARD: f64 = 0.5;
-/// A pose is much worse than usual if it loses the equivalent of this many perfectly seen joints.
+/// A pose is much worse than usual if its score is lower by at least the score of this many perfectly seen joints.
 pub(crate) const MUCH_WORSE: f32 = 1.5;
 /// Weight of a new score in the usual score.
 const NEW_SCORE: f32 = 0.1;
-/// Amount by which a box is enlarged to check whether it contains more of a person, as a share of the longer side.
+/// Amount by which a box is enlarged to check whether more of the person is outside it, as a fraction of the longer side.
 const WIDER: f64 = 0.25;
-/// Amount by which a box is enlarged for a person who may have moved on, and its maximum, as shares of the longer side. It applies per
-/// maximum gap between frames (0.4 s); in that time, a running person moves by half of the body height.
+/// Amount by which a box is enlarged for a person who may have moved on, and its maximum, as fractions of the longer side. The amount is
+/// for one maximum gap between frames (0.4 s), in which a running person moves by half of the body height.
 const MOVED: f64 = 0.5;
 const MOST_MOVED: f64 = 1.0;
 /// Maximum displacement of a person who stands still, as a share of the height of the network's window; less than the error
 /// of the network.
 const STILL: f64 = 0.01;
-/// A person whose last step exceeds this multiple of [`STILL`] has moved, whatever the mean velocity.
+/// If a person's last step exceeds this multiple of [`STILL`], the person has moved, whatever the mean velocity.
 const MOST_STEP: f64 = 3.0;
-/// Weight of the earlier velocity after a frame: between looks, the error of the network exceeds the motion of a standing person.
+/// Weight of the earlier velocity after a frame. It is high because, between two frames, the error of the network exceeds the motion of a
+/// standing person.
 const KEPT: f64 = 0.7;
 
 /// Where to look for a person in the next frame.
@@ -35,27 +36,27 @@ pub(crate) struct Track {
     pub(crate) is_doubtful: bool,
     /// Index of the person among the people of the frame.
     pub(crate) index: usize,
-    /// Number of frames since the last look at the person.
+    /// Number of frames since the network last ran on the person.
     pub(crate) n_held: u64,
-    /// How the person moves in the picture; `None` after one look.
+    /// How the person moves in the picture; `None` after a single sighting.
     pub(crate) pace: Option<Pace>,
     /// True if the person has already been seen in this frame.
     pub(crate) is_seen: bool,
 }
 
-/// Motion of a person in the picture, as shares of the height of the network's window.
+/// Motion of a person in the picture, as fractions of the height of the network's window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pace {
-    /// Mean velocity per frame, weighted towards the last looks.
+    /// Mean velocity per frame, with more weight on the most recent sightings.
     velocity: [f64; 2],
     /// Distance between the last two sightings.
     step: f64,
 }
 
 impl Pace {
-    /// Returns the pace after another look.
+    /// Returns the motion after another sighting.
     ///
-    /// * `moved`: displacement since the last look; `n_frames`: number of frames since the last look.
+    /// * `moved`, `n_frames`: displacement and number of frames since the last sighting.
     pub(crate) fn next(before: Option<Self>, moved: [f64; 2], n_frames: u64) -> Self {
         let n_frames = n_frames.max(1) as f64;
         let now = moved.map(|moved| moved / n_frames);
@@ -68,7 +69,7 @@ impl Pace {
         }
     }
 
-    /// Returns true if a person with this pace hardly moves in `n_frames` frames.
+    /// Returns true if a person with this motion hardly moves in `n_frames` frames.
     fn is_still(&self, n_frames: u64) -> bool {
         let [x, y] = self.velocity;
         self.step <= MOST_STEP * STILL && x.hypot(y) * n_frames as f64 <= STILL
@@ -78,8 +79,8 @@ impl Pace {
 impl Track {
     /// Returns where to look for a person next.
     ///
-    /// The result is the box around the pose, but sides move inward step by step. So if a pose leaves out the head or a leg in one frame,
-    /// the next box still contains it. A pose that is much worse than usual does not move any side.
+    /// The result is the box around the pose, but its sides move inward only step by step. So if the head or a leg is missing from a pose
+    /// in one frame, the next box still contains it. A pose that is much worse than usual does not move any side.
     ///
     /// * `looked_at`: the box of this frame, and the rotation of the picture; `usual_score`: usual score of the person's poses; `None` for
     ///   a new person.
@@ -113,15 +114,15 @@ impl Track {
         }
     }
 
-    /// Returns true if the person has hardly moved since the last look.
+    /// Returns true if the person has hardly moved since the last run of the network.
     ///
-    /// * `n_frames`: number of frames from the last look to this frame.
+    /// * `n_frames`: number of frames since that run.
     pub(crate) fn is_still(&self, n_frames: u64) -> bool {
         !self.is_doubtful && self.pace.is_some_and(|pace| pace.is_still(n_frames))
     }
 }
 
-/// Returns a box that shows more around a person of the previous frame.
+/// Returns a box that contains more of the surroundings of a person of the previous frame.
 pub(crate) fn wider(outline: [f64; 4]) -> [f64; 4] {
     enlarged(outline, WIDER)
 }

@@ -16,16 +16,15 @@ pub struct ViewResult {
     pub front: Vec<FrontEvidence>,
     /// Expected error of every part, in pixels of the frame, if predicted.
     pub sigma_px: Option<Vec<f32>>,
-    /// Thresholds that came with the prediction, in pixels of the frame; used if the settings contain
-    /// none.
+    /// Thresholds that came with the prediction, in pixels of the frame; used if the settings contain no thresholds.
     pub tau_px: Option<Vec<f32>>,
     /// Time of the picture after the instant of the frame, in seconds; negative if it was taken before.
     pub skew_s: f64,
 }
 
 impl ViewResult {
-    /// Returns true if the evidence covers all poses of the result. The evidence may not cover them: a restarted process can repeat a frame
-    /// with a different search window from that of the evidence that arrived before.
+    /// Returns true if the evidence covers all poses of the result. It may not cover them if a restarted process repeats a frame with
+    /// another search window than that of the evidence received earlier.
     pub fn is_within(&self, evidence: &Responses<'_>) -> bool {
         self.candidates.iter().all(|pose| evidence.covers(pose))
     }

@@ -1,4 +1,4 @@
-//! The single-view step: pixels in, candidates and evidence out.
+//! The single-view step: turns a picture into candidate poses and evidence.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,19 +13,19 @@ use viewquality::orientation::Detector;
 
 use crate::view_result::ViewResult;
 
-/// The levels of the pyramid that a view offers as evidence.
+/// The levels of the pyramid that a view provides as evidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EvidenceWindow {
-    /// All levels are offered.
+    /// All levels are provided.
     #[default]
     All,
-    /// The levels within this distance of the level of any candidate. All candidates count,
-    /// not only the best one, so that fusion can correct a view whose best candidate is wrong.
+    /// Only the levels within this distance of the level of a candidate are provided. All candidates count, not only the best one, so that
+    /// fusion can correct a view whose best candidate is wrong.
     Around(u16),
 }
 
 impl EvidenceWindow {
-    /// Returns the searched levels that are offered as evidence for these candidates, in ascending order.
+    /// Returns the searched levels that are provided as evidence for these candidates, in ascending order.
     pub fn levels(self, searched: Range<u16>, candidates: &[Pose]) -> Vec<u16> {
         let offered = |level: u16| match self {
             Self::All => true,
@@ -40,7 +40,7 @@ impl EvidenceWindow {
 /// Settings of the single-view step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewSettings {
-    /// Levels offered as evidence.
+    /// Levels provided as evidence.
     pub window: EvidenceWindow,
     /// Maximum number of candidates.
     pub n_candidates: usize,
@@ -71,7 +71,7 @@ pub struct ViewEstimate {
     pub candidates: Vec<Pose>,
     /// Evidence of the picture about the direction in which the person of every candidate faces; empty without a detector.
     pub front: Vec<FrontEvidence>,
-    /// Levels whose responses are offered as evidence, in ascending order.
+    /// Levels whose responses are provided as evidence, in ascending order.
     pub levels: Vec<u16>,
     /// How well each part of the best pose fits at its position; empty without a pose.
     pub local: Vec<LocalScore>,
@@ -170,7 +170,7 @@ impl ViewStep {
     /// Solves one frame within a scope.
     ///
     /// * `scope`: from [`Tracker::scope`], or [`Scope::whole`].
-    /// * `responses`: at least [`Layout::n_values`] values of the scope, possibly in shared memory. The values of the levels offered as
+    /// * `responses`: at least [`Layout::n_values`] values of the scope, possibly in shared memory. The values of the levels provided as
     ///   evidence are overwritten.
     ///
     /// # Panics

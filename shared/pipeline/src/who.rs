@@ -8,9 +8,10 @@ use crate::following::Follow;
 use crate::network_step::NetworkSettings;
 use crate::sighting::{Sighting, Sightings};
 
-/// Size of a network's window around a person, as a multiple of the longer side of the box around the joints.
+/// Size of the network's window around a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
-/// Number of ids reserved per process: a restarted process without memory starts after the reserved ids, so no id is used twice.
+/// Number of ids reserved for each start of the process: a restarted process without memory starts after the reserved ids, so that no id is
+/// used twice.
 const IDS_OF_A_PROCESS: u64 = 1000;
 
 /// A person of a frame.
@@ -25,7 +26,7 @@ pub struct KnownPerson {
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FramePeople {
-    /// The people, the followed person first. If only other people are seen, the followed person is still listed.
+    /// The people, the followed person first. If only other people are seen, the entry of the followed person is still there.
     pub people: Vec<KnownPerson>,
     /// Number of people on which several views agree.
     pub n_seen: usize,
@@ -36,7 +37,7 @@ pub struct FramePeople {
 pub struct WhoSettings {
     /// Rule that decides which of several people comes first.
     pub follow: Follow,
-    /// True if views label sides as they appear in the picture, so that two views may disagree.
+    /// True if views name left and right as they appear in the picture, so that two views may disagree.
     pub as_seen: bool,
     /// Minimum heat that half of the joints of a new person must have in two views, 0 to 1.
     pub least_heat: f64,
@@ -58,7 +59,7 @@ impl Default for WhoSettings {
     }
 }
 
-/// The step that identifies people, from the findings of the views only.
+/// The step that identifies people, using only what each view found.
 #[derive(Debug)]
 pub struct WhoStep {
     tracker: Tracker,
@@ -178,7 +179,7 @@ fn longer_px(sighting: &Sighting) -> f64 {
     (right - left).max(bottom - top)
 }
 
-/// Converts the sightings of a view to detections with their deviations.
+/// Converts the sightings of a view to detections with their standard deviations.
 fn view(seen: Option<&Sightings>) -> View {
     let detection = |sighting: &Sighting| {
         let window_px = WINDOW * longer_px(sighting);

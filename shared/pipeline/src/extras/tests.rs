@@ -32,7 +32,7 @@ const JOINTS: [[f64; 3]; 14] = [
 ];
 const EXTRAS: [[f64; 3]; 3] = [[0.1, 0.0, 1.62], [0.1, 0.13, 0.02], [0.3, -0.13, 0.02]];
 
-/// The sightings of all views, and the step.
+/// The sightings of all views, and the step to be tested.
 struct Scene {
     step: ExtrasStep,
     skeleton: Skeleton,
@@ -181,7 +181,7 @@ fn the_candidate_that_is_the_person_counts() {
 #[test]
 fn a_candidate_without_its_keypoints_is_no_other_one() {
     let mut scene = Scene::new();
-    // There was no room for the extra keypoints of the person.
+    // Nothing was stored for the person's extra keypoints, because there was no room.
     let by = [0.3, -1.2, 0.0];
     let other = scene.sighting(0, by);
     scene.seen[0].insert(0, other);

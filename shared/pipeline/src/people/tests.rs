@@ -28,7 +28,7 @@ pub(crate) fn camera(view: usize) -> Camera {
     }
 }
 
-/// Returns a view's sighting of a person at a place.
+/// Returns a view's sighting of a person who stands at a given position.
 fn sighting(camera: &Camera, [x, y]: [f64; 2], strength: f64) -> FoundBody {
     let line = [1.75, 1.5, 0.95, 0.5, 0.08].map(|z| Point3::new(x, y, z));
     let points_px = line.map(|line| <[f64; 2]>::from(camera.project(&line).unwrap()));

@@ -41,7 +41,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], heat: f32) -> Sighting {
     }
 }
 
-/// Returns the views' sightings of people at places, in an order that differs from view to view.
+/// Returns the views' sightings of people at given positions, in an order that differs from view to view.
 fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
     let view = |view: usize| {
         let camera = camera(view);

@@ -1,12 +1,12 @@
-//! Allocations of the steps of `fuse` and `triangulate` for a frame, after their buffers exist.
+//! Counts the allocations of the steps of `fuse` and `triangulate` for a frame, once their buffers exist.
 //!
-//! The goal of no allocations is not reached. But nothing as large as a response map is allocated: a frame with four times the
-//! cells allocates no more than a small one. The remaining allocations are the results (the poses of every solution, the
-//! joints) and short lists per frame with one entry per view, part, candidate or level. In `triangulate`, each list occurs once for
-//! each of the eight assumptions about facing of four views. The limits are the measured counts, rounded up. They should be lowered when a
-//! list is removed. They apply to test builds, with their additional checks.
+//! The goal of no allocations is not reached. But no allocation is as large as a response map: a frame with four times as many cells
+//! allocates no more than a small one. The remaining allocations are the results (the poses of every solution, the joints) and short lists
+//! per frame with one entry per view, part, candidate or level. In `triangulate`, each list occurs once for each of the eight assumptions
+//! about facing of four views. The limits are the measured counts, rounded up. They should be lowered when a list is removed. They apply to
+//! test builds, with their additional checks.
 //!
-//! This test runs without the test harness, whose threads allocate too; everything runs on one thread.
+//! This test runs without the test harness, because the harness's threads allocate memory too. Everything runs on one thread.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod scene;
@@ -25,7 +25,7 @@ static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
 /// Number of views of the rig; they form six pairs.
 const N_VIEWS: usize = 4;
 
-/// Limit of `fuse` for each single-view solution.
+/// Limit of `fuse`, for each single-view solution.
 const MOST_OF_SOLUTION: Count = Count {
     allocations: 13,
     bytes: 5_500,

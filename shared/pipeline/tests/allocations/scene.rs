@@ -15,7 +15,7 @@ use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 const N_TYPES: usize = 2;
 const N_LEVELS: usize = 3;
 
-/// The views of one frame, and their single-view findings.
+/// The views of one frame, and their single-view results.
 pub(crate) struct Scene {
     pub(crate) model: Arc<Model>,
     pub(crate) plans: Vec<Arc<ViewPlan>>,

@@ -1,4 +1,4 @@
-//! Without skews, results are bit-identical to results without instants.
+//! Checks that results without time skews are bit-identical to results without instants.
 
 use pipeline::{BodySettings, Skeleton, SkeletonSettings, SkeletonStep, ViewResult};
 

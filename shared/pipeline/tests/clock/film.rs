@@ -1,4 +1,4 @@
-//! Moving people, and their joints as seen by cameras with noise and with clocks of their own.
+//! Moving people, and their joints as seen by cameras with noise and with separate clocks.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
@@ -69,7 +69,7 @@ impl Film {
     }
 }
 
-/// Cached scenes, by whether the rig is a ring, the action and the seed.
+/// Cached scenes, keyed by whether the rig is a ring, by action and by seed.
 type Made = BTreeMap<(bool, &'static str, u64), Arc<Scene>>;
 
 /// Returns a scene from the cache, since creating one takes a while. All rings are around the same place.

@@ -1,6 +1,6 @@
-//! Tests for pictures that were not taken at the instant of their frame. They cover corrections for known times, and the detection of a
-//! camera whose times are wrong. People of the crate `scene` move in front of simulated cameras; the views see their joints exactly, apart
-//! from noise.
+//! Tests for pictures that were not taken at the instant of their frame. They cover the correction for known times, and the detection of a
+//! camera whose times are wrong. Synthetic people of the crate `scene` move in front of simulated cameras, which see their joints exactly,
+//! apart from noise.
 
 #![expect(clippy::expect_used, reason = "a test fails by panicking")]
 #![expect(

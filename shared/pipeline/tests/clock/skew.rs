@@ -1,4 +1,4 @@
-//! Measures the corrections for cameras that take their pictures up to half a period from the instants of the frames.
+//! Measures how well the result is corrected if cameras take their pictures up to half a period away from the instants of the frames.
 
 use geometry::skew::{Tracks, Velocity, moved, widened_px};
 use geometry::{Observation, Settings, longer_side, triangulate};
@@ -7,7 +7,7 @@ use scene::Action;
 
 use crate::film::{Film, N, RATE_HZ};
 
-/// How the skews of the cameras are taken into account.
+/// How the time skews of the cameras are taken into account.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum By {
     /// The skews are ignored.
@@ -64,7 +64,7 @@ fn error_mm(film: &mut Film, skews_ms: &[f64], by: By) -> f64 {
     1e3 * sum / n
 }
 
-/// Returns the position of a point that is used for the estimate, and its deviation.
+/// Returns the position of a point as used for the estimate, and its deviation.
 fn used(
     (at, sigma_px): (Point2<f64>, f64),
     velocity: Option<Velocity>,
@@ -81,7 +81,7 @@ fn used(
     }
 }
 
-/// Returns the errors for three people: without skews, then with skews and no correction, widening, moving and both.
+/// Returns the errors for three people: without skews; and with skews, under no correction, widening, moving and both.
 fn measured(rig: &str, action: Action, skews_ms: &[f64]) -> [f64; 5] {
     let mut sums = [0.0; 5];
     for seed in 1..=3 {

@@ -68,7 +68,7 @@ fn nothing_is_found_where_all_are_in_step() {
         let cameras = film.cameras().to_vec();
         for seed in 0..20 {
             film.reseed(seed);
-            // Skews that the timestamps report are not offsets.
+            // Skews that the timestamps already report are not offsets.
             let watch = watch(
                 &mut film,
                 400,
@@ -151,7 +151,7 @@ fn a_late_camera_may_look_moved_and_is_then_known_to_be_late() {
 fn a_camera_that_drifts_is_named_once_it_is_out_of_step() {
     let mut film = Film::new("ring:4", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
-    // 1 ms per second: thirty times the drift of real clocks.
+    // A drift of 1 ms per second: thirty times the drift of real clocks.
     let drift = |view: usize, frame: u32| {
         if view == 3 {
             f64::from(frame) / RATE_HZ
