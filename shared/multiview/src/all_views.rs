@@ -16,8 +16,8 @@ pub struct AllViewsInput<'a> {
     pub views: &'a [ViewInput<'a>],
     /// Part-type tables of a pair `(first, second)` of indices into `views`, `first < second`.
     pub tables: &'a dyn Fn(usize, usize) -> Option<&'a TypeTables>,
-    /// Weight of the terms of a pair. 1 uses the terms of all pairs unchanged; `1 / (n - 1)` gives all
-    /// supports of a view together the weight of the single support in a pair.
+    /// Weight of the terms of a pair. With 1, the terms of all pairs are used unchanged; with `1 / (n - 1)`, all views that support a view
+    /// together weigh as much as the single other view of a pair.
     pub weight: f64,
 }
 
@@ -30,41 +30,43 @@ pub struct AllViewsStart<'a> {
     pub exchanged: &'a [bool],
 }
 
-/// The result of all views.
+/// The result of solving all views together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsEstimate {
     /// The final energy.
     pub energy: f64,
-    /// The solutions, in order; their targets are indices into the views.
+    /// The single-view solutions, in order; their targets are indices into the views.
     pub iterations: Vec<Iteration>,
     /// True if the poses had converged at the end.
     pub converged: bool,
-    /// Share of the consistency terms that were switched on, over all pairs and parts.
+    /// Fraction of the consistency terms that were switched on, over all pairs and parts.
     pub active: f64,
-    /// The pose in every view; parts are named by the model, not exchanged.
+    /// The pose in every view; parts have the names of the model, without swapping left and right.
     pub poses: Vec<Pose>,
 }
 
 /// Maximises one energy over all views, from a given start.
 ///
-/// The energy is the paper's eq. 3 with a sum over all views and all pairs of views, `sum_v S(v) +
-/// weight sum_{v<u} (alpha xi + beta lambda)(v, u)`; the paper leaves this for later work. One view
-/// is solved exactly while all others are fixed. Its terms are the sums of the terms that each
-/// other view alone would add, so the graph remains a tree. Views take turns, the least trusted
-/// first. A solution is accepted only if the energy rises, so the energy never falls and a cycle is
-/// impossible (except with [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no
-/// view alone can raise the energy (up to the tolerance of `epsilon_px`), or after `max_iterations
-/// / 2` solutions of every view.
+/// The energy is the paper's eq. 3 with a sum over all views and all pairs of views, `sum_v S(v) + weight sum_{v<u} (alpha xi + beta
+/// lambda)(v, u)`; the paper mentions this as future work. One view is solved exactly while all others are fixed. Its terms are the sums of
+/// the terms that each other view alone would add, so the graph remains a tree. Views take turns, the least reliable first. A solution is
+/// accepted only if the energy rises, so the energy never falls and a cycle is impossible (except with
+/// [`SwitchBy::Support`](crate::SwitchBy::Support)). The loop ends when no view alone can raise the energy (up to the tolerance of
+/// `epsilon_px`), or after `max_iterations / 2` solutions of every view.
 ///
-/// The benefit was measured as PCP3D of `parallax-lab eval` on 134 instants (120 of three views and 14 of four; see the documentation of
-/// the crate). The mean of the terms (weight `1 / (n - 1)`) with two starts is compared with the mean of pairs:
+/// The benefit was measured as PCP3D (in percent, from `parallax-lab eval`) on 134 instants: 120 of three views and 14 of four (see the
+/// documentation of the crate). This method, with averaged terms (weight `1 / (n - 1)`) and two starts, was compared with averaging the
+/// results of the pairs:
 ///
-/// * With geometry alone, it reaches 73.3 against 71.0. It needs 15 solutions of a single view, against 20 (four views: 23 against 40).
-/// * With the network's expected errors, it reaches 75.9 against 75.1.
-/// * The sum of the terms (weight 1) reaches 72.6, with 17 solutions (four views: 32).
-/// * With an earlier model, pairs were better for three views (73.4 against 71.1).
-/// * If one of the four cameras was moved by two degrees, pairs are still better on these 14 instants (79.8 against 75.0 with geometry
-///   alone). But they are not better on all 70 frames (78.3 with types against 80.0), nor with the network (81.3 against 84.3).
+/// * With geometry alone, this method reaches 73.3 %, and pairs reach 71.0 %. It needs 15 single-view solutions, and pairs need 20 (with
+///   four views: 23 and 40).
+/// * With the network's expected errors, this method reaches 75.9 %, and pairs reach 75.1 %.
+/// * If the terms are added instead of averaged (weight 1), it reaches 72.6 % with geometry alone, and needs 17 solutions (with four views:
+///   32).
+/// * With an earlier model, pairs were better for three views (73.4 % instead of 71.1 %).
+/// * If one of the four cameras was rotated by two degrees, pairs are still better on these 14 instants with geometry alone (79.8 % instead
+///   of 75.0 %). But they are worse on all 70 frames with part types (78.3 % instead of 80.0 %), and with the network (81.3 % instead of
+///   84.3 %).
 ///
 /// A deployment selects this method by `views = "all"` in its section `[paper]`, with the mean of the terms
 /// and two starts.
@@ -72,7 +74,7 @@ pub struct AllViewsEstimate {
 /// [`EnergyKind::Released`](crate::EnergyKind::Released) has no such form; the terms are always
 /// the paper's.
 ///
-/// * `evidence`: the responses of every view; should include their bounds.
+/// * `evidence`: the responses of every view; they should include their bounds.
 ///
 /// # Panics
 ///
@@ -142,7 +144,7 @@ pub fn estimate_all_views(
 /// Detects when no view can move any more.
 struct Convergence {
     n_views: usize,
-    /// Number of solutions since the last one that moved its view.
+    /// Number of solutions since the last one that changed its view.
     n_still: usize,
     has_moved: bool,
 }
@@ -160,7 +162,7 @@ impl Convergence {
     fn after(&mut self, is_still: bool) -> bool {
         self.n_still = if is_still { self.n_still + 1 } else { 0 };
         self.has_moved |= !is_still;
-        // The last view that moved was solved against the current state of all others.
+        // The last view that changed was solved against the current state of all others.
         self.n_still + usize::from(self.has_moved) >= self.n_views
     }
 }
@@ -179,7 +181,7 @@ fn order(input: &AllViewsInput<'_>, poses: &[Pose]) -> Vec<usize> {
     order
 }
 
-/// Returns all pairs of views: `[first][second - first - 1]`.
+/// Returns all pairs of views, indexed as `[first][second - first - 1]`.
 fn inputs<'a>(input: &AllViewsInput<'a>) -> Vec<Vec<PairInput<'a>>> {
     let n = input.views.len();
     let pair = |first: usize, second: usize| PairInput {
@@ -191,7 +193,7 @@ fn inputs<'a>(input: &AllViewsInput<'a>) -> Vec<Vec<PairInput<'a>>> {
     (0..n).map(of_first).collect()
 }
 
-/// The terms of all pairs: `[first][second - first - 1]`.
+/// The terms of all pairs, indexed as `[first][second - first - 1]`.
 struct Pairs<'a> {
     terms: Vec<Vec<PairTerms<'a>>>,
 }
@@ -260,8 +262,8 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// Assigns numbers to the dependencies of a part's terms. A dependency is larger than a `u64`, so
-/// each distinct one gets the next number.
+/// Assigns numbers to the dependencies of a part's terms. A dependency does not fit into a `u64`, so each distinct one gets the next
+/// number.
 #[derive(Debug, Clone, Default)]
 struct TermKeys {
     kinds: BTreeMap<(usize, Vec<Option<u64>>), u64>,
@@ -333,7 +335,7 @@ impl State {
         self.own.iter().sum::<f64>() + pairs.map(|(a, b)| self.between[a][b]).sum::<f64>()
     }
 
-    /// Accepts a pose if it raises the energy as seen by the view.
+    /// Accepts a pose if it raises the energy that the view maximises.
     fn take_if_better(&mut self, view: usize, own: f64, pose: Pose, pairs: &Pairs<'_>) {
         let others = (0..self.poses.len()).filter(|other| *other != view);
         let gain = |pose: &Pose| -> f64 {

@@ -1,14 +1,15 @@
 //! Decides which side of a skeleton is the right-hand side, from the direction in which heads, knees, elbows and backs bend.
 //!
-//! Exchanging left and right in all views at once changes no energy. Two views show whether they agree, but not which of them sees the
-//! person from behind. The labelled skeleton can show it. Let `l` point from its right to its left, and `u` from its pelvis to its neck.
-//! Then `l x u` points to the front if the labels are right, and to the back if they are exchanged; and bodies bend forwards.
+//! Swapping left and right in all views at once changes no energy. Two views can show whether they agree, but not which of them sees the
+//! person from behind. A labelled 3D skeleton can show it. Let `l` point from its right to its left, and `u` from its pelvis to its neck.
+//! Then `l x u` points to the front if the labels are right, and to the back if they are swapped. The true front is known because bodies
+//! bend forwards.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 
 use crate::front::{L_HIP, L_SHOULDER, NECK, R_HIP, R_SHOULDER, front, trunk};
 
-/// Indices of the PARSE joints that the evidence uses.
+/// Indices of the PARSE joints that the evidence uses; this one is the right ankle.
 const R_ANKLE: usize = 0;
 const R_KNEE: usize = 1;
 const L_KNEE: usize = 4;
@@ -19,11 +20,11 @@ const L_ELBOW: usize = 10;
 const L_WRIST: usize = 11;
 const HEAD: usize = 13;
 
-/// Returns the evidence that left and right of a labelled skeleton are correct, in trunk lengths.
+/// Returns the evidence that left and right of a skeleton are labelled correctly, in trunk lengths.
 ///
 /// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from hip to ankle, the elbows
 /// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Exchanging left and right
-/// negates it exactly. This rule is our own, for a question that the paper leaves open.
+/// negates it exactly. The paper does not answer this question; the rule is our own.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing joint contributes 0.
 /// * Returns 0 if the trunk or both sides are missing.

@@ -1,5 +1,4 @@
-//! Part-type tables for camera pairs without training data, selected by the angle between the
-//! views.
+//! Part-type tables for pairs of cameras that have no training data of their own, selected by the angle between the views.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,9 +8,8 @@ use crate::{TypeTables, ViewInput};
 
 /// Part-type tables by the angle between two views, as seen from the person.
 ///
-/// The circle is divided into bins of equal width. Tables are given for one half; the other half
-/// has the same tables with the views exchanged. A pair uses the table of the bin that contains its
-/// angle.
+/// The circle is divided into bins of equal width. Tables are given for one half; the other half has the same tables with the views
+/// exchanged. A pair of views uses the table of the bin that contains its angle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleTables {
     /// Tables by angle, starting at -180 degrees; `None` if there is no table.
@@ -41,13 +39,12 @@ impl AngleTables {
     }
 }
 
-/// Returns the angle between two cameras as seen from the person: the rotation about the person from the
-/// first to the second camera, in radians from -pi to pi, counter-clockwise as seen from above.
+/// Returns the angle between two cameras as seen from the person: from the first camera to the second, in radians from -pi to pi,
+/// counter-clockwise as seen from above.
 ///
-/// The person is assumed where the rays through the centres of the views' best poses meet. The angle is
-/// therefore the angle between the rays, and the exact meeting point does not matter. Up is
-/// the mean up direction of the pictures. `None` if the lens model has no solution, or a view
-/// looks straight up or down.
+/// The person is assumed to be where the rays through the centres of the views' best poses meet. The angle is therefore the angle between
+/// the rays, and the exact meeting point does not matter. Up is the mean up direction of the pictures. Returns `None` if the lens model has
+/// no solution, or if a view looks straight up or down.
 pub fn angle_between(first: &ViewInput<'_>, second: &ViewInput<'_>) -> Option<f64> {
     let ups = [first, second].map(up);
     let up = (ups[0] + ups[1]).try_normalize(1e-6)?;

@@ -3,7 +3,7 @@
 /// The pose of one view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedPose {
-    /// Centre of every anatomical part, in pixels of the frame.
+    /// Centre of every part, named by the person's left and right, in pixels of the frame.
     pub centres_px: Vec<[f64; 2]>,
     /// Number of pairs that were averaged; 0 if this is the view's own pose.
     pub n_pairs: usize,
@@ -37,7 +37,7 @@ pub fn average(candidates: &[(f64, &[[f64; 2]])]) -> Option<FusedPose> {
     })
 }
 
-/// Renames the parts of an exchanged view by the side of the body instead of the side of the image.
+/// Renames the parts of a view that sees the person from behind: from left and right of the image to the person's left and right.
 pub fn anatomical(centres: &[[f64; 2]], mirror: Option<&[usize]>) -> Vec<[f64; 2]> {
     match mirror {
         Some(mirror) => mirror.iter().map(|&part| centres[part]).collect(),

@@ -12,12 +12,12 @@ pub struct Compatibility {
 /// Reason why a table was rejected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CompatibilityError {
-    /// The number of rows differs from the number of types of the model.
+    /// The number of rows differs from the total number of types of all parts of the model.
     #[error("the table has {got} rows, expected {expected}, one for each part and type")]
     Rows {
         /// Number of rows found.
         got: usize,
-        /// Number of types of all parts.
+        /// Number of types of all parts together.
         expected: usize,
     },
     /// The length of a row differs from the number of types of the part.
@@ -32,7 +32,7 @@ pub enum CompatibilityError {
         /// Expected number of columns.
         expected: usize,
     },
-    /// The parts are not in order.
+    /// The parts are not listed in order.
     #[error("line {line}, column 1: part `{got}`, expected {expected}")]
     Part {
         /// Line number, counted from 1.
@@ -75,10 +75,10 @@ pub enum CompatibilityError {
 impl Compatibility {
     /// Reads a table in the authors' format: conditional probabilities, without a header.
     ///
-    /// The table has one line per part and type of the *first*-named view, ordered by part, then by type. A line contains the 1-based part,
-    /// then `p(type in second view | type in first view)` for every type of the second view, separated by commas. A type of the first view
-    /// that did not occur in training has a line of NaN or of zeros. Such a line is read as zeros, which add nothing to any score, and
-    /// counted by [`Self::n_unseen`].
+    /// The table has one line for each part and each of its types in the *first* view, ordered by part, then by type. A line contains the
+    /// part's number, counted from 1, and then `p(type in second view | type in first view)` for every type of the second view, separated
+    /// by commas. A type of the first view that did not occur in training has a line of NaN or of zeros. Such a line is read as zeros,
+    /// which add nothing to any score, and counted by [`Self::n_unseen`].
     ///
     /// * `n_types`: number of types of every part.
     ///
@@ -120,8 +120,8 @@ impl Compatibility {
     ///
     /// With `R = p(b | a)` and `Q = p(a | b)`, the marginal `p(a)` satisfies `p(a) = p(a) R Q`. It is the stationary distribution of the
     /// chain that goes from a type of the first view to a type of the second view and back. Then `p(b) = p(a) R`, and both `p(a) R` and
-    /// `p(b) Q` are the joint distribution. If the tables contradict each other, these are two joints with the same marginals, and the
-    /// result is their mean. Types that did not occur get 0.
+    /// `p(b) Q` are the joint distribution. If the tables contradict each other, these two joint distributions differ, although they have
+    /// the same marginals; the result is their mean. Types that did not occur get 0.
     ///
     /// If the types form groups that never occur together, the tables do not determine the
     /// frequency of the groups. Every group is then weighted by its number of types in the first
@@ -129,8 +129,8 @@ impl Compatibility {
     ///
     /// * `second_given_first`: `p(b | a)`, `[part][a][b]`; `first_given_second`: `p(a | b)`,
     ///   `[part][b][a]`, as [`Self::parse`] reads them from the two files of a pair.
-    /// * Returns the joint, which sums to 1 for every part that occurred. Also returns the largest total
-    ///   variation distance between a part's two joints: 0 if the tables agree, at most 1.
+    /// * Returns the joint distribution, which sums to 1 for every part that occurred. Also returns the largest total variation distance
+    ///   between the two joint distributions of a part: 0 if the tables agree, at most 1.
     ///
     /// # Errors
     ///
@@ -175,7 +175,7 @@ impl Compatibility {
         self.n_unseen
     }
 
-    /// Returns the table with its views exchanged.
+    /// Returns the table with the two views in the opposite order.
     #[must_use]
     pub fn transposed(&self) -> Self {
         Self::of(self.values.iter().map(DMatrix::transpose).collect())
@@ -204,7 +204,7 @@ impl Compatibility {
     }
 }
 
-/// Maximum deviation of a row's sum from 1 that rounding to five digits may cause.
+/// Maximum deviation from 1 that rounding to five digits may cause in the sum of a row.
 const ROUNDING: f64 = 1e-3;
 
 /// Reads one row; `None` if its type did not occur in training.
@@ -260,7 +260,7 @@ fn shortened(field: &str) -> String {
     field.chars().take(24).collect()
 }
 
-/// Returns the joint `[a, b]`, computed twice: from `second = p(b | a)` and from `first = p(a | b)`.
+/// Returns the joint distribution `[a, b]`, computed twice: from `second = p(b | a)` and from `first = p(a | b)`.
 fn joints(second: &DMatrix<f64>, first: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let (second, first) = without_unseen(second.clone(), first.clone());
     let n = second.nrows();
@@ -287,7 +287,7 @@ fn without_unseen(
     mut second: DMatrix<f64>,
     mut first: DMatrix<f64>,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    // Every round removes at least one type, until there is nothing to remove.
+    // Every round removes at least one type, until none is left to remove.
     for _ in 0..2 * second.nrows() {
         clear_unseen(&first, &mut second);
         clear_unseen(&second, &mut first);
@@ -304,7 +304,7 @@ fn clear_unseen(from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
     }
 }
 
-/// Scales every row to sum 1; a row of zeros stays zero.
+/// Scales every row so that it sums to 1; a row of zeros stays zero.
 fn normalise_rows(mut matrix: DMatrix<f64>) -> DMatrix<f64> {
     for mut row in matrix.row_iter_mut() {
         let sum = row.sum();
@@ -325,7 +325,7 @@ mod tests {
         Compatibility::of(vec![DMatrix::from_fn(2, 2, |row, col| rows[row][col])])
     }
 
-    /// Joints of one part with 4 types, the last of which does not occur in the first view.
+    /// Returns joint distributions of one part with 4 types, the last of which does not occur in the first view.
     fn joint() -> impl Strategy<Value = Compatibility> {
         prop::collection::vec(0.01..1.0, 16).prop_map(|mut cells| {
             cells[12..].fill(0.0);

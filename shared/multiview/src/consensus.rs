@@ -1,10 +1,9 @@
-//! Selects one position of a part per view from the positions in the view's pairs, such that all views
-//! agree on one point of the world.
+//! For each part, selects one of the positions from each view's pairs, so that all views agree on one point in the world.
 
 use geometry::{Camera, Ray};
 use nalgebra::{Point2, Point3};
 
-/// The positions of a part in the pairs of one view.
+/// The positions of a part in one view, one for each pair that contains the view.
 #[derive(Debug, Clone)]
 pub struct Sightings<'a> {
     /// The camera of the frame.
@@ -18,11 +17,11 @@ pub struct Sightings<'a> {
 /// Settings of the consensus.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConsensusSettings {
-    /// Reprojection error above which the pull of a view decreases, in multiples of sigma.
+    /// Reprojection error above which the influence of a view decreases, in multiples of sigma.
     pub loss_sigmas: f64,
-    /// Maximum distance at which two pairs of a view count as having the same position, in multiples of sigma.
+    /// Maximum distance at which the positions from two pairs of a view count as the same, in multiples of sigma.
     pub same_sigmas: f64,
-    /// Weight of the votes of a view's pairs, relative to the agreement between views.
+    /// Weight of the number of a view's pairs that found a position, relative to the agreement between views.
     pub vote_weight: f64,
 }
 
@@ -39,7 +38,7 @@ impl Default for ConsensusSettings {
 /// Error assumed for a view that cannot see a point, in multiples of sigma.
 const UNSEEN: f64 = 1e6;
 
-/// A position found by some of a view's pairs.
+/// A position found by some of the pairs of a view.
 #[derive(Debug, Clone, Copy)]
 struct Choice {
     at: Point2<f64>,
@@ -50,15 +49,15 @@ struct Choice {
 
 /// Chooses a part's position in every view.
 ///
-/// The paper takes the mean over a view's pairs. If the pairs disagree, as for crossed legs and lifted arms, the mean lies between two
-/// positions and fits neither. This function looks for the point of the world that most views support. It considers all points `X` at which
-/// rays of positions of two views meet, and minimises
+/// The paper takes the mean over a view's pairs. If the pairs disagree, for example on crossed legs or raised arms, the mean lies between
+/// two positions and fits neither. This function instead looks for the point in the world that the most views support. It considers every
+/// point `X` at which the rays through positions of two views meet, and minimises
 ///
 /// `sum over views of min over positions k of c^2 (ln(1 + r_k^2 / c^2) - w ln(n_k / n))`
 ///
 /// where `r_k` is the distance of the projection of `X` from position `k` in sigma, and `n_k` of the view's `n` pairs found that position.
-/// The means are a further alternative, with the cost of a position that a single pair found; they are chosen if nothing else is
-/// consistent. A view with a single position keeps it. This rule is our own.
+/// The means are a further alternative, at the cost of a position that only one pair found; they are chosen if nothing else is consistent.
+/// A view with a single position keeps it. This rule is our own.
 ///
 /// * Returns one position per view, in pixels; `None` for a view without positions.
 pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<Option<[f64; 2]>> {
@@ -71,7 +70,7 @@ pub fn consensus(settings: &ConsensusSettings, views: &[Sightings<'_>]) -> Vec<O
 pub struct ConsensusWorkspace {
     /// Choices of every view.
     choices: Vec<Vec<Choice>>,
-    /// Mean of every view, if it has sightings.
+    /// Mean position of every view that has positions.
     means: Vec<Vec<Choice>>,
     kinds: Vec<Kind>,
 }
@@ -111,7 +110,7 @@ impl ConsensusWorkspace {
     }
 }
 
-/// Returns the point of the world indicated by the choices, unless the means fit together better.
+/// Returns the point in the world indicated by the choices, unless the means agree better.
 fn meeting(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -138,7 +137,7 @@ fn vote_cost(settings: &ConsensusSettings, n_votes: usize, n_pairs: usize) -> f6
 
 /// Returns the distinct positions of a view, in order of first occurrence.
 ///
-/// Answers close to the first one of a group are merged into one answer at their mean.
+/// Positions close to the first one of a group are merged into one position at their mean.
 fn distinct(
     settings: &ConsensusSettings,
     view: &Sightings<'_>,
@@ -167,7 +166,7 @@ fn distinct(
     choices.extend(kinds.iter().map(choice));
 }
 
-/// A group of answers that are close to the first of them.
+/// A group of positions that are close to the first of them.
 #[derive(Debug, Clone)]
 struct Kind {
     first: [f64; 2],
@@ -232,7 +231,7 @@ fn best(
     best
 }
 
-/// Returns the cost of a point of the world in all views.
+/// Returns the cost of a point in the world over all views.
 fn judge(
     settings: &ConsensusSettings,
     views: &[Sightings<'_>],
@@ -246,7 +245,7 @@ fn judge(
     })
 }
 
-/// Returns the answer of a view that is nearest to a point of the world, and its cost.
+/// Returns the position of a view that is nearest to a point in the world, and its cost.
 fn nearest(
     settings: &ConsensusSettings,
     view: &Sightings<'_>,
@@ -383,7 +382,7 @@ mod tests {
         let cameras = cameras(4);
         let views = sightings(&cameras, |view| {
             let [x, y] = projected(&cameras[view], KNEE);
-            // The offsets point in all directions, so that no two positions of different views meet near a third.
+            // The offsets point in all directions, so that the point where two views' positions meet is far from a third view's position.
             let [dx, dy] = [[60.0, 80.0], [-70.0, 75.0], [65.0, -90.0], [-85.0, -60.0]][view];
             vec![[x + dx, y + dy], [x - dx, y - dy]]
         });

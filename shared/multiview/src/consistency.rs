@@ -1,11 +1,11 @@
-//! The paper's terms between two views (eq. 3 to 7), with one view fixed or both given.
+//! The paper's terms between two views (eq. 3 to 7), for one fixed view or for two given poses.
 
 use fmp::{ExtraTerms, Pose};
 
 use crate::term::Term;
 use crate::{Compatibility, PairInput, Settings, SwitchBy};
 
-/// The parts of a pair's terms that stay the same from iteration to iteration.
+/// The terms of a pair, with everything that stays the same from iteration to iteration.
 #[derive(Debug)]
 pub(crate) struct PairTerms<'a> {
     settings: &'a Settings,
@@ -21,8 +21,8 @@ pub(crate) struct PairTerms<'a> {
 impl<'a> PairTerms<'a> {
     /// Creates the terms of a pair.
     ///
-    /// * `exchanged`: true if the second view shows the other side of the body. Such a pair needs a table
-    ///   of its own; without one, it has no appearance term.
+    /// * `exchanged`: true if the two views see the person from opposite sides. Such a pair needs a table of its own; without one, it has
+    ///   no appearance term.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let model = pair.views[0].plan.model();
         let counterpart = counterparts(model, exchanged);
@@ -51,8 +51,8 @@ impl<'a> PairTerms<'a> {
         first.iter().zip(second).map(|(a, b)| *a || *b).collect()
     }
 
-    /// Returns the value of the two consistency sums of eq. 3 for two given poses. If the switches of the
-    /// views differ, it is the mean of the values as seen by each view.
+    /// Returns the value of the two consistency sums of eq. 3 for two given poses. If the switches of the views differ, it is the mean of
+    /// the two values, one with each view's switches.
     pub(crate) fn between(&self, first: &Pose, second: &Pose) -> f64 {
         let value = self.for_target(0, first, second);
         if self.active[0] == self.active[1] {
@@ -119,7 +119,7 @@ impl<'a> PairTerms<'a> {
 
     /// Returns the part of the other view that corresponds to `part` of view `target`.
     fn partner(&self, part: usize) -> usize {
-        // The exchange is its own inverse, so one table serves both directions.
+        // Swapping left and right twice changes nothing, so one table serves both directions.
         self.counterpart[part]
     }
 
@@ -133,7 +133,7 @@ impl<'a> PairTerms<'a> {
     }
 }
 
-/// The terms as seen by the target view while the support is fixed.
+/// The terms for the target view while the supporting view is fixed.
 #[derive(Debug)]
 pub(crate) struct Consistency<'a> {
     pair_terms: &'a PairTerms<'a>,
@@ -206,7 +206,7 @@ impl ExtraTerms for Consistency<'_> {
 /// The key of a part whose support adds nothing.
 pub(crate) const NO_SUPPORT: u64 = u64::MAX;
 
-/// Returns a key that identifies everything in a support that affects the terms of one pair.
+/// Returns a key for everything in the supporting pose that affects the terms of one pair.
 pub(crate) fn support_key(support: &Pose, part: usize) -> u64 {
     let at = support.parts[part];
     let fields = [at.x, at.y, u16::from(at.mixture)].map(u64::from);
@@ -222,8 +222,7 @@ pub(crate) fn counterparts(model: &fmp::Model, exchanged: bool) -> Vec<usize> {
     }
 }
 
-/// Eq. 6 for each target view, by part of the first view: a part is off if a relevant expected
-/// error exceeds its threshold.
+/// Evaluates eq. 6 for each target view, by part of the first view: a part is off if a relevant expected error exceeds its threshold.
 fn active_parts(
     settings: &Settings,
     pair: &PairInput<'_>,

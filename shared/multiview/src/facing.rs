@@ -1,5 +1,4 @@
-//! Decides which views see the person from behind: ranks assignments by the energies of all pairs
-//! and tracks them over time.
+//! Decides which views see the person from behind: ranks the possible assignments by the energies of all pairs, and tracks them over time.
 
 /// The result of one pair under each assumption about its two views.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,11 +15,10 @@ const MAX_VIEWS: usize = 16;
 /// A bit set of views: bit `v` is set if left and right of view `v` are exchanged.
 pub type Exchanges = u32;
 
-/// Ranks the assignments of exchanges by the sum of the pairs' energies.
+/// Ranks the possible assignments of swapped views by the sum of the pairs' energies.
 ///
-/// A pair only shows whether its two views agree. The first present view is therefore never
-/// exchanged here; [`SidesFilter`](crate::SidesFilter) decides whether all views are exchanged. For a view without a pair,
-/// both assignments are returned.
+/// A pair only shows whether its two views agree. So the first view is never taken as swapped here; [`SidesFilter`](crate::SidesFilter)
+/// decides whether all views are swapped. For a view without a pair, both assignments are returned.
 ///
 /// * `present`: bit `v` is set if view `v` is present; the views of all pairs must be present.
 /// * Returns at most `limit` assignments with the sum of the pairs' energies, best first.
@@ -64,22 +62,22 @@ pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
     exchanges >> view & 1 == 1
 }
 
-/// One assignment of a frame.
+/// One possible assignment for a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingHypothesis {
-    /// Exchanges relative to the first view.
+    /// The views whose left and right are swapped relative to the first view.
     pub exchanges: Exchanges,
     /// Energy of all views under this assignment.
     pub energy: f64,
 }
 
-/// How strongly the facing of a frame depends on the previous frame.
+/// How strongly the decision of a frame depends on the previous frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FacingSettings {
-    /// Energy cost of exchanging one view from one frame to the next.
+    /// Energy cost of one view changing between front and back from one frame to the next.
     pub change_cost: f64,
-    /// Weight of the earlier frames' scores in the next frame, 0..1. The default halves the weight in 34 frames: people face the same way
-    /// for longer than they take to bend down or make a step.
+    /// Weight of the earlier frames' scores in the next frame, from 0 to 1. The default halves the weight in 34 frames, because people face
+    /// the same way for longer than it takes to bend down or to take a step.
     pub memory: f64,
 }
 
@@ -95,7 +93,7 @@ impl Default for FacingSettings {
 /// The decision of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facing {
-    /// The views that see the person from a different side than the first view.
+    /// The views that see the person from the opposite side to the first view.
     pub exchanges: Exchanges,
     /// Index of the chosen hypothesis.
     pub hypothesis: usize,
@@ -107,9 +105,8 @@ pub struct Facing {
 /// filter. An assignment and its complement count as the same; [`SidesFilter`](crate::SidesFilter)
 /// decides between them.
 ///
-/// The score of an assignment is its score in this frame plus the best score of a path from the
-/// previous frame; every view that changes adds a cost. The first frame is decided by its own
-/// energies alone.
+/// The total score of an assignment is its score in this frame plus the best score of a path from the previous frame; every view that
+/// changes between front and back adds a cost. The first frame is decided by its energies alone.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FacingFilter {
     scores: Vec<(Exchanges, f64)>,
@@ -192,7 +189,7 @@ mod tests {
 
     #[test]
     fn one_pair_is_outvoted_by_the_others() {
-        // The pair (1, 2) alone would prefer the same facing.
+        // The pair (1, 2) alone would prefer that both views see the same side.
         let pairs = [
             pair(0, 1, 2.0, 1.0),
             pair(0, 2, 1.0, 2.0),

@@ -12,10 +12,9 @@ pub(crate) const NECK: usize = 12;
 
 /// Evidence of the picture of one view about the direction in which the person faces.
 ///
-/// The components are `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two
-/// components, `2 e n` is the logarithm of the likelihood of facing `n` over that of facing `-n`: the
-/// natural parameter of a von Mises distribution. Zeros mean no evidence. Evidence of independent views adds
-/// up. Any detector can provide it.
+/// The components are `[towards the right of the picture, towards the camera]`. For a unit vector `n` with these two components, `2 e n` is
+/// the logarithm of the likelihood of facing `n` over that of facing `-n`: the natural parameter of a von Mises distribution. Zeros mean no
+/// evidence. Evidence of independent views adds up. Any detector can provide this evidence.
 pub type FrontEvidence = [f32; 2];
 
 /// Returns the direction in which a labelled skeleton faces, as a unit vector in the frame of its joints.

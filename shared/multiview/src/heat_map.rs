@@ -1,12 +1,9 @@
-//! The authors' heat map: the closeness of every cell to a rasterised epipolar line, between 0 and
-//! 1.
+//! The authors' heat map: how close every cell is to a rasterised epipolar line, from 0 to 1.
 //!
-//! It follows the description of the released program. A line one pixel wide is drawn on an image
-//! of the original size, and the image is reduced by area averaging to the size of the response map. Every
-//! cell whose average differs from the background is on the line. A 3x3 chamfer distance transform
-//! measures the distance `d` of all cells from the line, and `1 - sqrt(d / d_max)` is the heat. The map also
-//! covers the padding cells, so the line is off by up to a cell towards the borders, as in the
-//! program.
+//! It follows the description of the released program. A line one pixel wide is drawn on an image of the original size, and the image is
+//! reduced by area averaging to the size of the response map. Every cell whose average differs from the background is on the line. A 3x3
+//! chamfer distance transform measures the distance `d` of all cells from the line, and `1 - sqrt(d / d_max)` is the heat. As in the
+//! program, the map also covers the padding cells, so the line is off by up to a cell towards the borders.
 
 /// Weights of the 3x3 chamfer mask.
 const STRAIGHT: f32 = 0.955;
@@ -14,9 +11,9 @@ const DIAGONAL: f32 = 1.3693;
 
 /// Returns the heat of an epipolar line, as in the released program: 1 on the line, 0 in the farthest cell.
 ///
-/// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` the largest one of the map. All
-/// values are zero if the line misses the image. The function is public for comparison with the program; the terms of
-/// [`EnergyKind::Released`](crate::EnergyKind::Released) use it.
+/// The heat is `1 - sqrt(d / d_max)`, where `d` is the chamfer distance of a cell from the line and `d_max` is the largest distance in the
+/// map. All values are zero if the line misses the image. The terms of [`EnergyKind::Released`](crate::EnergyKind::Released) use this
+/// function. It is public so that it can be compared with the program.
 ///
 /// * `ends`: the line's intersections with the image's border, `[x, y]` as the program counts
 ///   pixels (from 1); rounded half to even, then used as if counted from 0.
@@ -73,7 +70,7 @@ fn overlap(index: usize, cell: f64, pixel: f64) -> f64 {
     (hi.min(pixel + 1.0) - lo.max(pixel)).max(0.0)
 }
 
-/// Bits for the sides of the image beyond which a point lies; left is 1 and right is 2.
+/// Bits that show on which sides of the image a point outside it lies; left is 1 and right is 2.
 const ABOVE: i64 = 0b0100;
 const BELOW: i64 = 0b1000;
 const VERTICAL: i64 = ABOVE | BELOW;

@@ -1,12 +1,11 @@
 //! Learns the consistency parameters between views from people with known joints.
 //!
-//! This is the paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions with the truth
-//! ([`ViewObservation`]). From the solutions that are nearly right, it learns which part types occur together
-//! ([`Counts`]), the median errors of parts (tau), and the map from parts to joints. [`Learned`] is the file
-//! beside a model with the result.
+//! This is the paper's section 5, "Consistency parameters". [`Learner`] takes single-view solutions together with the ground truth
+//! ([`ViewObservation`]). From the solutions that are nearly right, it learns which part types occur together ([`Counts`]), the median
+//! errors of parts (tau), and the map from parts to joints. [`Learned`] is the result, a file stored beside the model.
 //!
-//! [`Local`] learns from single views of annotated people where joints are relative to the parts around them; [`JointFile`]
-//! stores the result. This module does not read files or the clock.
+//! [`Local`] learns the positions of joints relative to the parts around them, from annotated people in single views; [`JointFile`] stores
+//! the result. This module does not read files or the clock.
 
 mod counts;
 mod file;

@@ -28,7 +28,7 @@ pub struct Iteration {
     pub pose: Pose,
 }
 
-/// The result of a pair under one assumption about facing.
+/// The result of a pair under one assumption about which view sees the person from behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairEstimate {
     /// The start of the optimisation.
@@ -42,21 +42,19 @@ pub struct PairEstimate {
     /// For each part of the first view, true if its consistency terms were switched on. For `Released`, these are the switches while the
     /// first view was the support; those of the second view as a support are not included.
     pub active: Vec<bool>,
-    /// The pose in the first and in the second view; parts are named by the model, not exchanged.
+    /// The poses in the first and in the second view; parts have the names of the model, without swapping left and right.
     pub poses: [Pose; 2],
 }
 
 /// Maximises the joint energy of a pair from a given start.
 ///
-/// Eq. 3 of the paper is maximised by solving one view exactly while the other view (the support) is
-/// fixed, then exchanging roles (section 6). The first support is the view with the lower expected
-/// error, summed over its parts, or the one with the higher score if either view has no expected
-/// errors.
+/// Eq. 3 of the paper is maximised by solving one view exactly while the other view (the support) is fixed, then exchanging roles (section
+/// 6). The first support is the view whose expected errors have the smaller sum over its parts. If a view has no expected errors, it is the
+/// view with the higher score.
 ///
-/// Under [`EnergyKind::Paper`], a solution is accepted only if it raises the energy as seen by the
-/// target. With [`SwitchBy::Either`](crate::SwitchBy::Either), both views see the same energy, so it
-/// never falls and a cycle is impossible. The loop ends when a view does not move after a solution
-/// of the other: then neither view alone can raise the energy (up to the tolerance of
+/// Under [`EnergyKind::Paper`], a solution is accepted only if it raises the target's energy. With
+/// [`SwitchBy::Either`](crate::SwitchBy::Either), both views maximise the same energy, so it never falls and a cycle is impossible. The
+/// loop ends when a view does not move after a solution of the other: then neither view alone can raise the energy (up to the tolerance of
 /// `epsilon_px`).
 ///
 /// Under [`EnergyKind::Released`], every solution is accepted, whatever its score, as in the
@@ -93,7 +91,7 @@ fn paper(
     let (mut iterations, mut converged) = (Vec::new(), false);
     for iteration in 0..settings.max_iterations {
         let consistency = Consistency::new(&terms, target, &poses[1 - target]);
-        // Another candidate may suit the support better than the current pose.
+        // Another candidate may agree better with the support than the current pose does.
         let guesses = pair.views[target].candidates.iter();
         let guesses = guesses.chain([&poses[target]]);
         let found = incremental[target].best(&consistency, guesses);
@@ -186,7 +184,7 @@ fn released_pair(
     }
 }
 
-/// Returns true if the shortcuts gave the exact result; always true with bounds that do not belong to the evidence.
+/// Returns true if the shortcuts gave the exact result. With bounds that do not belong to the evidence, always returns true.
 pub(crate) fn is_best(
     solver: &Solver,
     evidence: &Responses<'_>,

@@ -1,11 +1,9 @@
-//! The terms that the authors' program adds to a view's scores, implemented from its description.
+//! The terms that the authors' program adds to a view's scores, implemented from the program's description.
 //!
 //! Three points that the description calls bugs are corrected:
 //!
-//! * A support outside its table adds nothing (the program draws a line around the top-left
-//!   corner).
-//! * The rescue of a part that both views would switch off checks that part (the program checks
-//!   part 1).
+//! * A support outside the program's table of lines adds nothing (the program draws a line around the top-left corner).
+//! * A part that both views would switch off can be switched on again after a check of that part (the program always checks part 1).
 //! * A type that did not occur in training adds nothing (the program's table holds NaN).
 
 use fmp::{ExtraTerms, Pose};
@@ -15,7 +13,7 @@ use crate::consistency::{NO_SUPPORT, counterparts, support_key};
 use crate::heat_map::heat_map;
 use crate::{Compatibility, PairInput, Settings};
 
-/// The parts of a pair's terms that stay the same from iteration to iteration.
+/// The terms of a pair, with everything that stays the same from iteration to iteration.
 #[derive(Debug)]
 pub(crate) struct ReleasedPair<'a> {
     settings: &'a Settings,
@@ -29,8 +27,8 @@ pub(crate) struct ReleasedPair<'a> {
 }
 
 impl<'a> ReleasedPair<'a> {
-    /// * `exchanged`: true if the second view shows the other side of the body. Such a pair does not use
-    ///   the type tables, which are learned on views with the model's part names.
+    /// * `exchanged`: true if the two views see the person from opposite sides. Such a pair does not use the type tables, because they were
+    ///   learned with the model's part names.
     pub(crate) fn new(settings: &'a Settings, pair: &'a PairInput<'a>, exchanged: bool) -> Self {
         let counterpart = counterparts(pair.views[0].plan.model(), exchanged);
         Self {
@@ -135,7 +133,7 @@ impl ExtraTerms for ReleasedTerms<'_> {
     }
 }
 
-/// Returns the whole pixel, counted from 0, at which the program looks up the line of a support.
+/// Returns the integer pixel position, counted from 0, at which the program looks up the line of a support.
 ///
 /// * `from_one`: centre of the support, in pixels counted from 1, as computed by the program.
 /// * `size`: size of the support's image and of the program's table. The table contains the pixels
@@ -178,9 +176,8 @@ impl Line {
 
 /// Returns the switches of each view, by its parts: off if the expected error exceeds the threshold.
 ///
-/// If both views would be off and their expected errors differ by more than the part's median
-/// training error, the better view is switched back on. This is the intended form of the program's rescue,
-/// which checks the wrong part.
+/// If both views would be off and their expected errors differ by more than the part's median training error, the better view is switched
+/// back on. The program intends the same, but checks the wrong part.
 fn weights(settings: &Settings, pair: &PairInput<'_>, counterpart: &[usize]) -> [Vec<bool>; 2] {
     let n_parts = counterpart.len();
     let sigma = |view: usize, part: usize| {
@@ -245,8 +242,8 @@ mod tests {
         assert_eq!(looked_up([7.4, 20.5], [64, 48]), Some([6.0, 20.0]));
     }
 
-    /// Test case: the top of the head in `HumanEva`'s C3, at cell 35 of the eleventh level, whose cells are exactly 8
-    /// pixels. 263.49999999999983 + 1 was rounded to the pixel on its left.
+    /// Test case: the top of the head in `HumanEva`'s C3, at cell 35 of the eleventh level, whose cells are exactly 8 pixels.
+    /// 263.49999999999983 + 1 was rounded down.
     #[test]
     fn a_support_between_two_pixels_is_rounded_as_in_the_program() {
         let filter = fmp::Filter {

@@ -16,20 +16,18 @@ pub enum EnergyKind {
     Released,
 }
 
-/// The expected error that switches the terms of a part off, in the paper's energy.
+/// Which expected error can switch the terms of a part off, in the paper's energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SwitchBy {
     /// The error of either view: the paper's eq. 6.
     #[default]
     Either,
-    /// The error of the support alone, as in the authors' program: a reliable view continues to correct
-    /// an unreliable one, and does not follow it. Each view then has its own energy. The energy of
-    /// a pair is the mean of both, and may fall during the optimisation.
+    /// The error of the support alone, as in the authors' program: a reliable view continues to correct an unreliable one, but is not
+    /// changed by it. Each view then has its own energy. The energy of a pair is the mean of the two, and may fall during the optimisation.
     Support,
-    /// The error of the support, if the support is also the worse of the two views (each relative to its thresholds). The better of two
-    /// unreliable views continues to support the other, so that the views still support each other if large errors are expected everywhere.
-    /// Energies are defined as for
-    /// [`Self::Support`].
+    /// The error of the support, but only if the support is the worse of the two views (each error relative to its threshold). The better
+    /// of two unreliable views continues to support the other, so that the views still support each other if large errors are expected
+    /// everywhere. Energies are defined as for [`Self::Support`].
     Worse,
 }
 
@@ -41,9 +39,8 @@ pub struct TypeTables {
     /// The table `p(type in first, type in second)`, or another value for each pair of types, for
     /// [`EnergyKind::Paper`].
     pub joint: Arc<Compatibility>,
-    /// Joint table for views of which one sees the other side of the person: rows are types of the
-    /// first view's part, columns are types of the second view's part that shows the same limb. If `None`,
-    /// such views have no appearance term.
+    /// Joint table for two views from opposite sides of the person. Rows are types of the first view's part; columns are types of the
+    /// second view's part that shows the same limb. If `None`, such views have no appearance term.
     pub exchanged: Option<Arc<Compatibility>>,
 }
 
@@ -72,11 +69,9 @@ pub struct Settings {
     pub energy: EnergyKind,
     /// Weight of the geometric term.
     ///
-    /// `Paper`: score per squared cell. Distances are divided by the cell size of the pose's own
-    /// level before they are squared. The weight then has the same effect for near and far
-    /// people and at every resolution, and can be compared with the springs of the model (the
-    /// weakest of which is 0.01 per squared cell). `Released`: score of a cell on the line; 0.07 in
-    /// the authors' runs.
+    /// `Paper`: score per squared cell. Distances are divided by the cell size of the pose's own level before they are squared. The weight
+    /// then has the same effect for near and far people and at every resolution, and can be compared with the springs of the model (the
+    /// weakest of which is 0.01 per squared cell). `Released`: score of a cell on the epipolar line; 0.07 in the authors' runs.
     pub alpha: f64,
     /// Weight of the appearance term: score of two types that always occur together.
     pub beta: f64,
@@ -85,21 +80,20 @@ pub struct Settings {
     pub max_distance_cells: f64,
     /// Maximum number of single-view solutions of a pair.
     pub max_iterations: usize,
-    /// Mean movement of the part centres below which a view counts as converged, in pixels.
+    /// Mean movement of the part centres, in pixels, below which a view counts as converged.
     pub epsilon_px: f64,
     /// Expected error above which a part is switched off, in pixels of the frame, one per part; if empty,
     /// no part is switched off.
     pub tau_px: Vec<f32>,
-    /// The expected error that switches a part off.
+    /// Which expected error switches a part off.
     pub switch: SwitchBy,
-    /// The thresholds of `tau_px` in tenths of the person's size in the view, which is the longer side of the rectangle around the part
-    /// centres of its best pose; used if `tau_px` is empty.
+    /// The same thresholds as `tau_px`, but in tenths of the person's size in the view; used if `tau_px` is empty. The size is the longer
+    /// side of the rectangle around the part centres of the view's best pose.
     pub tau_tenths: Vec<f32>,
-    /// `Released` only: minimum difference of the expected errors at which the better of two views that
-    /// are both off is switched on again, in pixels, one per part (the median training errors); if empty,
-    /// no view is switched on again.
+    /// `Released` only: minimum difference of the expected errors, in pixels, one per part (the median training errors). If both views are
+    /// off and their errors differ by at least this much, the better one is switched on again. If empty, no view is switched on again.
     pub rescue_px: Vec<f32>,
-    /// Decide for every view whether left and right are exchanged; the paper does not do this.
+    /// Decide for every view whether left and right are swapped; the paper does not do this.
     pub facing: bool,
     /// Maximum number of candidates per view that the start may combine; 1 is the paper's start.
     pub n_candidates: usize,

@@ -1,20 +1,19 @@
 //! Decides, for all views together and over time, which side of the body is the right-hand side.
 //!
-//! Exchanging left and right in all views changes no energy. So the decision uses the front evidence of the views
-//! ([`front`](crate::front())) and the way bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
+//! Swapping left and right in all views changes no energy. So the decision uses the views' evidence of the direction in which the person
+//! faces ([`front`](crate::front())), and the way in which bodies bend ([`anatomical_evidence`](crate::anatomical_evidence)).
 
 use nalgebra::Vector3;
 
-/// Settings for deciding the sides.
+/// Settings for deciding left and right.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SidesSettings {
-    /// Log-likelihood ratio per nat of the views' evidence about the front. The value is below 1 because views err together
-    /// about the front of a person more often than if they were independent.
+    /// Weight of the views' evidence of the direction in which the person faces: log-likelihood ratio per nat. It is below 1 because the
+    /// errors of the views are not independent.
     pub front_weight: f64,
     /// Log-likelihood ratio per unit of anatomical evidence (trunk lengths), in nats.
     pub anatomy_weight: f64,
-    /// Probability that a person turns around from one frame to the next. It limits the weight of the earlier
-    /// frames.
+    /// Probability that a person turns around from one frame to the next. It limits how much the earlier frames count.
     pub turn: f64,
     /// Log-odds below which a decision is unsure, in nats.
     pub unsure: f64,
@@ -31,7 +30,7 @@ impl Default for SidesSettings {
     }
 }
 
-/// The decision of a frame.
+/// The decision for one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
     /// True if left and right must be exchanged in all views.
@@ -44,8 +43,8 @@ pub struct Sides {
 
 /// Tracks over time which side is the right-hand side, with a Bayes filter of one bit.
 ///
-/// The bit is carried from frame to frame by the direction in which the person faces, so the labels
-/// of the frames do not matter.
+/// The bit is passed from frame to frame by means of the direction in which the person faces, so how the earlier frames were labelled does
+/// not matter.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SidesFilter {
     /// The last direction, and the log-odds that it is correct.
@@ -83,8 +82,8 @@ impl SidesFilter {
 
 /// Returns the log-odds of this frame's labels that follow from the log-odds of the last frame's labels.
 ///
-/// * `cosine`: cosine of the angle between the two directions. A person who seems to have turned by a right
-///   angle may have turned to either side.
+/// * `cosine`: cosine of the angle between the two directions. If the person seems to have turned by a right angle, the turn may have been
+///   to either side.
 fn carried(settings: &SidesSettings, cosine: f64, log_odds: f64) -> f64 {
     let cosine = cosine.clamp(-1.0, 1.0);
     let turned = settings.turn + (0.5 - settings.turn) * (1.0 - cosine.abs());

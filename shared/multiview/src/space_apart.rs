@@ -1,4 +1,4 @@
-//! Keeps the right and the left limbs of a person apart, even if the evidence puts both at one place.
+//! Keeps the right and the left limbs of a person apart, even if the evidence places both at one point.
 //!
 //! The tree has no bone between the two legs. If a network shows both ankles in the map of either ankle, both legs may end up at the ankle
 //! that is seen better. That evidence then counts twice, and nothing explains the other foot. A term on pairs of joints prevents this:
@@ -6,7 +6,7 @@
 //! `E_apart(X) = - a sum_(r,l) max(0, 1 - |X_r - X_l| / d)`
 //!
 //! where `d` is the minimum distance of a pair. The term closes loops, so the tree alone is no longer exact. Instead, one side is kept away
-//! from the place of the other, and the tree is solved again. The better of the two solutions is chosen.
+//! from the position of the other, and the tree is solved again. The better of the two solutions is chosen.
 
 use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
@@ -21,8 +21,8 @@ fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -
     pairs.iter().map(of_pair).sum()
 }
 
-/// Returns the better of a solution and the solutions in which the right or the left arm or leg is kept away from the other, if both are at
-/// the same place.
+/// Returns the best of a solution and of new solutions for limbs that coincide: in these, the right or the left arm or leg is kept away
+/// from the other.
 ///
 /// * `first`: the best solution on the tree.
 /// * Returns the solution, and the places that its joints are kept away from.

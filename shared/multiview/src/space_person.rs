@@ -1,5 +1,5 @@
-//! Solves for a person in space without prior knowledge: which views exchange left and right, which views
-//! look elsewhere, and how tall the person is.
+//! Solves for a person in space without prior knowledge. Decides which views have left and right swapped, which views show something else,
+//! and how tall the person is.
 
 use geometry::Camera;
 use nalgebra::Point3;
@@ -15,23 +15,24 @@ use crate::space_view::{LIMBS, N, SpaceView};
 pub struct SolvedPerson {
     /// Positions of the joints.
     pub pose: SpacePose,
-    /// For every view, whether the names of left and right were exchanged, for the arms and for the legs. `None` for a view that was left
-    /// out because it contradicts all others.
+    /// For every view, whether left and right were swapped, for the arms and for the legs. `None` for a view that was left out because it
+    /// contradicts all others.
     pub views: Vec<Option<[bool; 2]>>,
 }
 
 /// Solves for a person about whom nothing is known.
 ///
-/// 1. The places suggested by pairs of views, and the bones of people of any stature, give a first solution.
-/// 2. Unless the first solution fits every view: with three views or more, exchanging left and right in one view is tried. It is kept if it
-///    gives a better first solution. If left and right follow the picture ([`SpaceSettings::as_seen`]), every view may be exchanged
-///    relative to the first. Then the views' evidence of the direction in which the person faces counts as well.
-/// 3. The arms or the legs of a view are exchanged if they fit better that way.
-/// 4. Unless the first solution fits every view: with four views or more, views that contradict all others are left out. Their camera
-///    was moved, or they look at another person.
-/// 5. The bones of a person of the first solution's stature, and finer and finer grids, give the second solution.
+/// 1. A first solution is found among the places suggested by pairs of views, with bone lengths for people of any stature.
+/// 2. If the first solution does not fit every view, and there are at least three views, left and right are swapped in one view after the
+///    other. A swap is kept if it gives a better first solution. If views name left and right as they appear in the picture
+///    ([`SpaceSettings::as_seen`]), any view may be swapped relative to the first. Then the views' evidence of the direction in which the
+///    person faces counts as well.
+/// 3. Left and right arms, or left and right legs, of a view are swapped if they fit better that way.
+/// 4. If the first solution does not fit every view, and there are at least four views, views that contradict all others are left out.
+///    Their camera was moved, or they show another person.
+/// 5. A second solution is found on finer and finer grids, with bone lengths for the stature of the first solution.
 ///
-/// * Returns `None` if no joint is seen by two views.
+/// * Returns `None` if no joint is seen by at least two views.
 pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SolvedPerson> {
     let mut solver = FirstSolver {
         views,
@@ -105,12 +106,12 @@ impl<'a> FirstSolver<'a> {
         }
     }
 
-    /// Returns the best first solution with no view, or one view, exchanged.
+    /// Returns the best first solution with left and right swapped in no view, or in one view.
     ///
-    /// * `best`: the solution with no view exchanged.
+    /// * `best`: the solution with no view swapped.
     fn with_one_exchanged(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
         if used.len() < 3 {
-            // With two views, it is unknown which one is exchanged.
+            // With two views, it is unknown which one is swapped.
             return Some(best);
         }
         let mut exchanged = None;
@@ -129,10 +130,10 @@ impl<'a> FirstSolver<'a> {
         Some(best)
     }
 
-    /// Returns the best first solution with any of the views except the first exchanged. With few views, all combinations are tried;
-    /// otherwise, views are exchanged one after the other as long as that helps.
+    /// Returns the best first solution with left and right swapped in any of the views except the first. With few views, all combinations
+    /// are tried; otherwise, views are swapped one after the other as long as that helps.
     ///
-    /// * `best`: the solution with no view exchanged.
+    /// * `best`: the solution with no view swapped.
     fn as_seen(&mut self, used: &mut [Used], mut best: SpacePose) -> Option<SpacePose> {
         let mut chosen = 0usize;
         let n = used.len().min(usize::BITS as usize);
@@ -158,7 +159,8 @@ impl<'a> FirstSolver<'a> {
         Some(best)
     }
 
-    /// Exchanges the views whose bits are set. If this gives a better first solution than `best`, replaces `best` and returns true.
+    /// Swaps left and right in the views whose bits are set. If this gives a better first solution than `best`, replaces `best` and returns
+    /// true.
     fn improves(
         &mut self,
         used: &mut [Used],
@@ -175,10 +177,10 @@ impl<'a> FirstSolver<'a> {
         Some(is_better)
     }
 
-    /// Returns the view without which the others agree best, if most of its joints contradict the solution of the others. `None` if there
-    /// is no such view, or if there are fewer than four views, which cannot show a contradiction.
+    /// Returns the view without which the others agree best, if most of its joints contradict the solution of the others. Returns `None` if
+    /// there is no such view. Also returns `None` for fewer than four views, because they cannot show which view is wrong.
     ///
-    /// A half-covered view still fits with its other half; a view whose camera was moved fits nowhere.
+    /// If half of the person is hidden in a view, the other half still fits; if the camera was moved, nothing fits.
     fn contradicts(&mut self, used: &[Used]) -> Option<usize> {
         const LEAST: usize = 4;
         if used.len() < LEAST {
@@ -203,7 +205,7 @@ impl<'a> FirstSolver<'a> {
         worst.map(|(nth, _)| nth)
     }
 
-    /// Exchanges left and right in views that then fit better; returns true if there were any.
+    /// Swaps left and right in the views that then fit better; returns true if there were any.
     fn exchange(&self, used: &mut [Used], found: &SpacePose) -> bool {
         let mut any = false;
         for used in used {
@@ -241,23 +243,22 @@ fn set_exchanged(used: &mut [Used], combination: usize) {
 }
 
 /// Returns how well the direction in which a solution faces, or the opposite direction, agrees with the evidence of the views, in nats.
-/// Whether the names of all views are exchanged is decided elsewhere.
+/// Elsewhere, it is decided whether left and right are swapped in all views.
 ///
-/// Consider two pairs of opposite cameras, and shoulders rotated by an angle from their viewing directions. Shoulders rotated by the same
-/// angle in the other direction look the same except for the names. If left and right follow the picture, only this function distinguishes
-/// the two.
+/// Consider two pairs of opposite cameras, and a person whose shoulders are rotated by some angle from the viewing directions. If the
+/// shoulders are rotated by the same angle in the other direction, the pictures are the same except for the names of left and right. If
+/// views name left and right as they appear in the picture, only this function distinguishes the two cases.
 fn front_agreement(views: &[SpaceView<'_>], found: &SpacePose) -> f64 {
     let said = views.iter().map(|view| (view.camera, view.front));
     let said: Vec<(&Camera, FrontEvidence)> = said.collect();
     front_log_ratio_of(&found.joints, &said).abs() / 2.0
 }
 
-/// Share of the joints used for the [`shortfall`] of a view. At this share, three quarters of the joints exceed the shortfall.
+/// Quantile of the joints used for the [`shortfall`] of a view: three quarters of the joints fall short by more than this quantile.
 const QUARTER: f64 = 0.25;
 const MOST: f64 = 0.75;
 
-/// Returns how much less the found joints fit a view than the view's own best places do: the quantile of this amount over the joints, at a
-/// given share.
+/// Returns by how much less the solved joints fit a view than the view's own best positions do, as a quantile over the joints.
 fn shortfall(view: &SpaceView<'_>, found: &SpacePose, share: f64) -> f64 {
     let of_joint = |(joint, at): (usize, &Option<Point3<f64>>)| {
         let named = view.named(joint);

@@ -1,5 +1,5 @@
-//! The places that pairs of views suggest for the joints, with the evidence of every view there. They are computed once, for all exchanges
-//! of names and all selections of views.
+//! The places in space that pairs of views suggest for the joints, with the evidence of every view there. They are computed once, for all
+//! swaps of left and right and all selections of views.
 
 use nalgebra::Point3;
 
@@ -7,7 +7,7 @@ use geometry::Ray;
 
 use crate::space_view::{N, Places, SpaceView, name, other_side};
 
-/// Places of every joint, and the evidence of all views for the joint at each of them.
+/// Candidate places of every joint, and the evidence of all views for the joint at each place.
 pub(crate) struct Choices {
     /// Positions, in metres in the world.
     pub(crate) places: Places,
@@ -15,7 +15,7 @@ pub(crate) struct Choices {
     pub(crate) scores: [Vec<f64>; N],
 }
 
-/// A used view, and whether left and right are exchanged in its evidence, for the arms and for the legs.
+/// A view that is used, and whether its left and right are swapped, for the arms and for the legs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Used {
     /// Index of the view among the views of [`Crossings::new`].
@@ -27,7 +27,7 @@ pub(crate) struct Used {
 #[derive(Default)]
 struct Points {
     at: Vec<Point3<f64>>,
-    /// Evidence of every view for every point, for the name of the first view's joint and for the name of its other side.
+    /// Evidence of every view for every point, both for the name of the first view's joint and for the same joint on the other side.
     evidence: Vec<[f64; 2]>,
 }
 
@@ -36,7 +36,8 @@ pub(crate) struct Crossings<'a> {
     views: &'a [SpaceView<'a>],
     /// Rays by view and name. Inverting a lens is iterative and slow, so it is done once per maximum.
     rays: Vec<[Vec<Ray>; N]>,
-    /// Points by pair of views, name in the first view, and whether the second view has the other side of that name; computed on demand.
+    /// Points by pair of views, by joint name in the first view, and by whether the second view gives it the name of the other side;
+    /// computed on demand.
     points: Vec<Option<Points>>,
 }
 

@@ -1,4 +1,5 @@
-//! Solves for the joints of a person in space: first the best on the tree, then with the limbs apart, then on finer and finer grids.
+//! Solves for the joints of a person in space: first for the best solution on the tree, then with the limbs kept apart, then on finer and
+//! finer grids.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,10 +8,10 @@ use crate::space_places::Choices;
 use crate::space_tree::{BoneLength, Occupied, SpacePose, SpaceSettings, TREE, best_on_tree, cost};
 use crate::space_view::{N, SpaceView, unary};
 
-/// Number of places along each axis of the coarsest grid, and (below) of the finer grids.
+/// Number of places along each axis of the coarsest grid; the next constant is that of the finer grids.
 const COARSEST: usize = 5;
 const FINER: usize = 3;
-/// Maximum number of grids per resolution around the solution.
+/// Maximum number of grids around the solution for each resolution.
 const N_GRIDS: usize = 2;
 
 /// Solves for all joints at once.
@@ -55,7 +56,7 @@ pub(crate) fn solve_in_space(
 /// Number of passes that move every joint between the places of the finest grid.
 const N_SWEEPS: usize = 2;
 
-/// Constraints on a joint other than the views.
+/// Constraints on a joint other than those from the views.
 struct Held<'a> {
     lengths: &'a [BoneLength; N - 1],
     occupied: &'a Occupied,

@@ -5,9 +5,9 @@
 //! `E(X) = sum_v sum_j u_v(j, P_v X_j) - mu sum_(i,j) rho((|X_i - X_j| - L_ij) / s_ij)`
 //!
 //! with `u = lambda ln(max(h, 0) + eps)` and `rho(z) = min(z^2 / 2, cap)`. The floor of `u` allows the other views to outvote a view that
-//! does not see a joint. The bones form a tree, so the best choice among places of every joint is exact (Felzenszwalb &
-//! Huttenlocher 2005). Places are first those suggested by pairs of views, then grids around the solution, from coarse to fine
-//! (Pavlakos et al. 2017; Qiu et al. 2019).
+//! does not see a joint. The bones form a tree, so the best choice among places of every joint is exact (Felzenszwalb & Huttenlocher 2005).
+//! The places are first those suggested by pairs of views, then those of grids around the solution, from coarse to fine (Pavlakos et al.
+//! 2017; Qiu et al. 2019).
 
 use nalgebra::Point3;
 
@@ -54,17 +54,18 @@ pub struct SpaceSettings {
     pub apart: f64,
     /// Minimum distance between the two joints of a pair at which the pair costs nothing, in metres.
     pub least_apart_m: f64,
-    /// True if left and right follow the picture: every view may have them exchanged, independently of the others.
+    /// True if views name left and right as they appear in the picture, so that any view may have them swapped, independently of the
+    /// others.
     pub as_seen: bool,
-    /// Amount by which exchanged sides must fit a view better to be accepted.
+    /// Minimum amount by which a view must fit better with left and right swapped for the swap to be accepted.
     pub margin: f64,
-    /// The first solution fits a view if three quarters of its joints score at most this much less than the view's own best
-    /// places. If it fits all views, no other solution is searched for.
+    /// Limit for the first solution to fit a view: three quarters of its joints must score less than the view's own best positions by at
+    /// most this amount. If it fits all views, no other solution is searched for.
     pub good_fit: f64,
-    /// A view contradicts all others if three quarters of the joints of their solution score this much less than the view's own
-    /// best places.
+    /// Limit above which a view contradicts all others: three quarters of the joints of their solution score less than the view's own best
+    /// positions by at least this amount.
     pub most_misfit: f64,
-    /// Maximum number of places of a joint at the start.
+    /// Maximum number of candidate places of a joint for the first solution.
     pub n_places: usize,
     /// Distance between the places of the coarsest grid, in metres.
     pub coarsest_m: f64,
@@ -99,12 +100,13 @@ pub struct SpacePose {
     pub energy: f64,
 }
 
-/// Stature of unknown people, and its standard deviation, in metres; our choice, wide enough for children.
+/// Stature assumed for unknown people, and its standard deviation, in metres. These values are our own choice; the deviation is large
+/// enough to include children.
 const STATURE: [f64; 2] = [1.65, 0.20];
 
 /// Returns the bone lengths of [`TREE`] for a person with these joints, or for any person if `joints` is `None`.
 ///
-/// The stature combines the estimate from the joints with the prior for people, each weighted by its certainty.
+/// The stature is the mean of the estimate from the joints and that for people in general, each weighted by its certainty.
 pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N - 1] {
     use skeleton::body::Kind::{
         Head, HipWidth, LowerArm, LowerLeg, ShoulderToNeck, Trunk, UpperArm, UpperLeg,
@@ -152,9 +154,9 @@ pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettin
     settings.apart * (1.0 - share).max(0.0)
 }
 
-/// Returns the best of all choices of one place for each joint, by messages from the leaves to the root and back.
+/// Returns the best choice of one place for each joint, by passing messages from the leaves to the root and back.
 ///
-/// * `choices`: the places of every joint, possibly none.
+/// * `choices`: the candidate places of every joint, possibly none.
 /// * `occupied`: places that joints are kept away from.
 /// * Returns `None` if no joint has a place.
 pub(crate) fn best_on_tree(

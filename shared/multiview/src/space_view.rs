@@ -1,4 +1,4 @@
-//! The evidence of a view for joints at places in space.
+//! The evidence of a view for joints at points in space.
 
 use nalgebra::Point3;
 
@@ -18,7 +18,7 @@ pub(crate) fn other_side(joint: usize) -> usize {
     pair.map_or(joint, |[right, left]| right + left - joint)
 }
 
-/// Returns the name of a joint of the body in a view.
+/// Returns the view's name of a joint of the body.
 pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
     let limbs = LIMBS.iter().zip(exchanged);
     let mut exchanged = limbs.filter(|(_, is_exchanged)| *is_exchanged);
@@ -35,7 +35,7 @@ pub trait JointEvidence {
     fn at(&self, joint: usize, point: [f64; 2]) -> f32;
     /// Returns the possible positions of a joint, in pixels of the picture, the best first, each with its evidence.
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
-    /// Returns the evidence of a joint that the view does not show: the floor.
+    /// Returns the evidence for a joint that the view does not show: the floor.
     fn floor(&self) -> f32;
 }
 
@@ -46,7 +46,7 @@ pub struct SpaceView<'a> {
     pub camera: &'a Camera,
     /// Evidence of the view.
     pub evidence: &'a dyn JointEvidence,
-    /// True if left and right are exchanged in the evidence, for the arms and for the legs.
+    /// True if left and right are swapped in the evidence, for the arms and for the legs.
     pub exchanged: [bool; 2],
     /// Evidence of the picture about the direction in which the person faces; zeros mean no evidence.
     pub front: FrontEvidence,
@@ -58,7 +58,7 @@ pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> 
 }
 
 impl SpaceView<'_> {
-    /// Returns the evidence for a joint of the body at a place, with the view's exchanges applied.
+    /// Returns the evidence for a joint of the body at a place, after swapping left and right where the view has them swapped.
     pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
         self.at(self.named(joint), at) as f32
     }

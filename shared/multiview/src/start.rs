@@ -1,12 +1,13 @@
-//! The start of fusion for a frame: which candidate of every view shows the person, and from which side each view sees the person.
+//! The start of fusion for a frame: each view's candidate that shows the person, and whether each view sees the person from the front or
+//! from behind.
 
 use crate::consistency::PairTerms;
 use crate::{Epipolar, PairInput, Settings, TypeTables, ViewInput};
 
-/// Maximum number of joint states for an exhaustive search.
+/// Maximum number of combinations of candidates and swaps for an exhaustive search.
 const MAX_STATES: usize = 200_000;
 
-/// Maximum number of views, not counting the first, for which every assumption about facing is tried.
+/// Maximum number of views, not counting the first, for which every assumption about front and back views is tried.
 const MAX_FREE: usize = 6;
 
 /// The common start of all views of a frame.
@@ -14,21 +15,20 @@ const MAX_FREE: usize = 6;
 pub struct Start {
     /// Candidate of every view.
     pub candidates: Vec<usize>,
-    /// For every view, true if left and right are exchanged relative to the first view.
+    /// For every view, true if left and right are swapped relative to the first view.
     pub exchanged: Vec<bool>,
     /// Sum of the joint energies (eq. 3) of all pairs at the start.
     pub energy: f64,
 }
 
-/// Chooses the candidates and exchanges of left and right with the highest energy over all pairs.
+/// Chooses the candidates, and the swaps of left and right, that have the highest energy over all pairs.
 ///
-/// The sum of eq. 3 over all pairs of views is maximised over one candidate per view and one
-/// exchange per view except the first (an exchange in all views changes no energy). With one
-/// candidate per view and `facing` off, this is the paper's start. Up to 200 000 joint states are
-/// searched exhaustively. Beyond that, views are added one by one and then revised until nothing
+/// The sum of eq. 3 over all pairs of views is maximised. The variables are one candidate per view, and for each view except the first,
+/// whether it is swapped. (A swap in all views would change no energy.) With one candidate per view and `facing` off, this is the paper's
+/// start. Up to 200 000 combinations are searched exhaustively. Beyond that, views are added one by one and then revised until nothing
 /// changes. Ties go to the lower candidates. The terms between views are always the paper's, even under
-/// [`EnergyKind::Released`](crate::EnergyKind::Released), because the authors' program does not choose a start. Its alpha, which is meant
-/// for heat maps, gives these terms a large weight.
+/// [`EnergyKind::Released`](crate::EnergyKind::Released), because the authors' program does not choose a start. The alpha of that program
+/// is meant for heat maps, and gives these terms a large weight.
 ///
 /// * `views`: the views with a result, in a fixed order.
 /// * `tables`: part-type tables of a pair of indices into `views`.
@@ -76,7 +76,7 @@ pub fn rank_starts<'a>(
         let best = choose_start(settings, views, tables).exchanged;
         let flipped = best.iter().skip(1).enumerate();
         let best = flipped.fold(0, |pattern, (bit, it)| pattern | usize::from(*it) << bit);
-        // If the first view alone is exchanged, all others are exchanged instead.
+        // If the first view alone is swapped, all others are swapped instead.
         let all = (1 << n_free) - 1;
         let one = (0..n_free).map(|bit| best ^ 1 << bit);
         let mut some: Vec<usize> = one.chain([best, best ^ all]).collect();
@@ -88,7 +88,7 @@ pub fn rank_starts<'a>(
     starts
 }
 
-/// Returns the joint state with the highest energy over all pairs.
+/// Returns the combination with the highest energy over all pairs.
 fn best_of<'a>(
     settings: &Settings,
     views: &[ViewInput<'a>],
@@ -145,7 +145,7 @@ fn tried(settings: &Settings, view_input: &ViewInput<'_>) -> impl Iterator<Item 
     own.take(settings.n_candidates.max(1))
 }
 
-/// Energies between two views: `[first][second - first - 1][state of first][state of second]`.
+/// Energies between two views, indexed as `[first][second - first - 1][state of first][state of second]`.
 type Between = Vec<Vec<Vec<Vec<f64>>>>;
 
 fn between<'a>(

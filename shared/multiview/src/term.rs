@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::ViewPlan;
 
-/// Squared distance assumed if the lens model has no solution, in cells^2.
+/// Squared distance that is assumed if the lens model has no solution, in cells^2.
 const UNSEEN: f64 = 1e6;
 
 /// The geometry of an ordered pair of views.
@@ -51,8 +51,8 @@ pub(crate) struct Term {
 }
 
 impl Term {
-    /// Creates the term of a support at `support_px` (undistorted); `None` if the support has no line because it lies on
-    /// the epipole, or the camera centres coincide.
+    /// Creates the term of a support at `support_px` (undistorted). `None` if the support has no line, because it lies on the epipole or
+    /// because the camera centres coincide.
     pub(crate) fn new(
         support_from_target: Matrix3<f64>,
         support_px: [f64; 2],
@@ -87,7 +87,7 @@ impl Term {
         let r2 = r * r;
         let in_target = r2 * self.inverse_norm2 / target_scale2;
         let in_support = r2 / ((mx * mx + my * my) * self.support_scale2);
-        // `min` also replaces NaN by the cap; a position without a solution, and the epipole, give NaN.
+        // `min` also replaces NaN by the cap; NaN occurs at the epipole, and at positions for which the lens model has no solution.
         in_target.min(self.cap) + in_support.min(self.cap)
     }
 }
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn distances_are_measured_in_cells_of_their_own_view() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, f64::INFINITY).unwrap();
-        // 8 pixels are 2 cells of the support (4 px) and 4 cells of the target (2 px).
+        // 8 pixels are 2 cells in the support view (4 px each) and 4 cells in the target view (2 px each).
         let got = term.distance2([7.0, 38.0], 4.0);
         assert!((got - (4.0 + 16.0)).abs() < 1e-12, "{got}");
     }

@@ -1,5 +1,4 @@
-//! The data of a view for fusion: its camera, the positions of its cells, and its single-view
-//! result.
+//! The data of a view for fusion: its camera, the positions of its cells, and its single-view result.
 
 use std::sync::{Arc, OnceLock};
 
@@ -28,8 +27,8 @@ pub struct ViewPlan {
 impl ViewPlan {
     /// Prepares a view.
     ///
-    /// A part's centre is the centre of its first type's filter. In a model that mixes filter sizes within one part, the centres of the
-    /// other types are off by at most half the difference, in cells.
+    /// A part's centre is the centre of its first type's filter. If the types of a part have filters of different sizes, the centres of the
+    /// other types are wrong by at most half the difference in size.
     ///
     /// * `camera`: the camera of the frame from which the pyramid is built, after resizing and
     ///   rotation.
@@ -137,8 +136,8 @@ pub struct ViewInput<'a> {
     pub plan: &'a ViewPlan,
     /// Distinct candidates of the view, best first; not empty.
     pub candidates: &'a [Pose],
-    /// Candidates that show a different person from the other views: bit `c` is set for candidate `c`. They cannot be a start. At least one
-    /// bit is 0.
+    /// Candidates that show a different person from the other views: bit `c` is set for candidate `c`. Fusion cannot start from them. At
+    /// least one bit is 0.
     pub others: u64,
     /// Expected error of every part, in pixels; `None` without a prediction.
     pub sigma_px: Option<&'a [f32]>,

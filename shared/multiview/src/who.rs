@@ -1,4 +1,4 @@
-//! Selects, among the people found by networks in every view, the same person in all views.
+//! Finds the same person in all views, among the people found by a network in each view.
 
 use geometry::Camera;
 use nalgebra::Point2;
@@ -13,7 +13,7 @@ pub struct SeenPerson {
 }
 
 /// Maximum distance between rays to the same person, in metres. Only the nearest third of the joints is used, since half of a person may be
-/// covered.
+/// hidden.
 const SAME_M: f64 = 0.20;
 /// Minimum score of a joint that is used to identify a person.
 const LEAST_SCORE: f64 = 0.3;
@@ -23,7 +23,7 @@ const MOST: usize = 4;
 /// Chooses one person in every view so that the rays of the views meet. If there are several such people, the largest is chosen.
 ///
 /// * `views`: the camera and the people of every view.
-/// * `as_seen`: true if left and right follow the picture, so that two views may have them exchanged.
+/// * `as_seen`: true if views name left and right as they appear in the picture, so that two views may disagree.
 /// * Returns the index of the person in each view; `None` if nobody in the view fits the others. A single view keeps its largest
 ///   person.
 pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Option<usize>> {
@@ -34,7 +34,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
         order
     };
     let mut best: (f64, Vec<Option<usize>>) = (f64::NEG_INFINITY, vec![None; views.len()]);
-    // Every detection is tried as the person; each other view contributes its person nearest to the rays.
+    // Every detection is tried as the person; each other view then contributes the detection nearest to its rays.
     for (nth, (camera, people)) in views.iter().enumerate() {
         for person in by_size(people) {
             let mut chosen = vec![None; views.len()];
@@ -59,7 +59,7 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
                     size += theirs[it].height;
                 }
             }
-            // The number of views decides first, then the size.
+            // More views win; among equal numbers of views, the larger person wins.
             let n = chosen.iter().flatten().count();
             let score = 100.0 * n as f64 + size;
             if score > best.0 {
@@ -73,7 +73,8 @@ pub fn same_person(views: &[(&Camera, &[SeenPerson])], as_seen: bool) -> Vec<Opt
 /// The same joint on the other side.
 const MIRROR: [usize; 14] = [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13];
 
-/// Returns the distance within which the rays meet for a third of the joints that two views share; `None` if they share fewer than three.
+/// Returns the distance within which the rays of two views meet for the nearest third of the joints that they share; `None` if they share
+/// fewer than three joints.
 ///
 /// * `named`: the second view's name of a joint of the first view.
 fn apart([a, b]: [(&Camera, &SeenPerson); 2], named: impl Fn(usize) -> usize) -> Option<f64> {

@@ -22,7 +22,7 @@ use crate::skeleton_settings::{Combine, SkeletonSettings};
 use crate::space::{Seen, Space};
 use crate::{AllViewsResult, PairResult, ViewResult};
 
-/// Which poses a skeleton was triangulated from.
+/// The poses from which a skeleton was triangulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kept {
     /// The poses solved by fusion.

@@ -1,4 +1,4 @@
-//! Percentiles and medians; each definition has its own name.
+//! Percentiles and medians; each definition has a name of its own.
 
 use core::cmp::Ordering;
 
@@ -40,8 +40,8 @@ impl Number for f64 {
 
 /// A sample in ascending order that provides percentiles and medians.
 ///
-/// All of them are `None` for an empty sample. The definitions differ if a percentile lies between two values.
-/// Stored or compared values must always use the definition with which they were computed.
+/// All of them are `None` for an empty sample. The definitions differ if a percentile lies between two values. Results that are stored or
+/// compared must all use the same definition.
 ///
 /// ```
 /// let sample = statistics::Sorted::new([4.0, 1.0, 3.0, 2.0]);
@@ -59,7 +59,7 @@ pub struct Sorted<T = f64> {
 impl<T: Number> Sorted<T> {
     /// Sorts a sample.
     ///
-    /// * `values`: the values in any order. NaN is sorted after all numbers, or before them if its sign is negative.
+    /// * `values`: the values, in any order. NaN is sorted after all numbers, or before all numbers if its sign bit is set.
     pub fn new(values: impl Into<Vec<T>>) -> Self {
         let mut values = values.into();
         values.sort_by(T::order);
@@ -87,10 +87,10 @@ impl<T: Number> Sorted<T> {
         self.values.get(self.values.len() / 2).copied()
     }
 
-    /// Returns the smallest value for which at least a given share of the sample is no larger (nearest rank). It is always a value of the
-    /// sample.
+    /// Returns the percentile as the smallest value such that at least a given fraction of the sample is not larger (nearest rank). It is
+    /// always a value of the sample.
     ///
-    /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
+    /// * `share`: fraction from 0 to 1; 0.9 is the 90th percentile.
     pub fn nearest_rank(&self, share: f64) -> Option<T> {
         let n = self.values.len();
         let rank = (share * n as f64).ceil() as usize;
@@ -101,7 +101,7 @@ impl<T: Number> Sorted<T> {
 impl Sorted<f64> {
     /// Returns the percentile, interpolated linearly between neighbours (definition 7 of Hyndman and Fan 1996).
     ///
-    /// * `share`: 0.9 is the 90th percentile; 0 the smallest value, 1 the largest.
+    /// * `share`: fraction from 0 to 1; 0.9 is the 90th percentile.
     pub fn interpolated(&self, share: f64) -> Option<f64> {
         let last = self.values.len().checked_sub(1)?;
         let at = share.clamp(0.0, 1.0) * last as f64;

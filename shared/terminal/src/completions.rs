@@ -1,4 +1,4 @@
-//! `parallax completions` and `parallax man`: writes the files that shells and `man` need, from the tree of commands.
+//! `parallax completions` and `parallax man`: write shell completions and manual pages, generated from the tree of commands.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
-//! Input and output of the programs on the command line.
+//! Input and output of the command-line programs.
 //!
-//! Data are written to standard output, messages and progress to standard error. This crate also has the options of all commands,
-//! the exit codes in `--help`, completions, and manual pages.
+//! Data is written to standard output; messages and progress are written to standard error. This crate also has the options of all
+//! commands, the exit codes in `--help`, completions, and manual pages.
 #![forbid(unsafe_code)]
 
 pub mod completions;

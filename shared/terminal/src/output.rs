@@ -8,7 +8,7 @@ use indicatif::{HumanDuration, ProgressState, ProgressStyle};
 use serde::Serialize;
 use tracing::Level;
 
-/// Amount of output and log of a command.
+/// How much a command prints and logs.
 #[derive(Debug, Clone, Copy)]
 pub struct Verbosity {
     /// Print errors only.
@@ -17,11 +17,7 @@ pub struct Verbosity {
     pub level: Level,
 }
 
-/// Writes a line of data. A closed pipe (`| head`) is not an error.
-///
-/// # Errors
-///
-/// Fails if standard output cannot be written to.
+/// Writes a line of data. A closed pipe (as with `| head`) is not an error.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -45,15 +41,15 @@ pub fn message(text: impl Display) {
     drop(writeln!(io::stderr().lock(), "{text}"));
 }
 
-/// Reports a failure that does not end the program.
+/// Reports a failure after which the program continues.
 pub fn failure(failure: &Failure) {
-    // If standard error fails, the failure cannot be reported.
+    // If writing to standard error fails, the failure cannot be reported.
     drop(failure.report(&mut io::stderr().lock()));
 }
 
 /// Returns the style of a progress bar; `None` if `indicatif` does not accept the template.
 ///
-/// * `template`: template of `indicatif`. `{left}` becomes a comma and the remaining time, or nothing while that is not known.
+/// * `template`: template of `indicatif`. `{left}` is replaced by a comma and the remaining time, or by nothing while that time is unknown.
 pub fn bar_style(template: &str) -> Option<ProgressStyle> {
     let style = ProgressStyle::with_template(template).ok()?;
     Some(

@@ -10,10 +10,10 @@ use serde_json::Value;
 
 use crate::output;
 
-/// Interval between lines of progress if there is no bar.
+/// Interval between lines of progress, if there is no progress bar.
 const PERIOD: Duration = Duration::from_secs(5);
 
-/// Console that shows progress as a bar on a terminal, and messages unless quiet. Writes events as JSON if requested.
+/// Console that shows progress as a bar if it is a terminal, and messages unless they are turned off. Writes events as JSON if requested.
 #[derive(Debug)]
 pub struct Terminal {
     bar: ProgressBar,
@@ -22,7 +22,7 @@ pub struct Terminal {
     lines: Option<Lines>,
 }
 
-/// State of progress in lines.
+/// State of the progress that is printed as lines.
 #[derive(Debug)]
 struct Lines {
     /// Name of the things that are counted, such as `pictures`.

@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
-    /// Counts of views that see the person from the same side.
+    /// Counts for two views that see the person from the same side.
     pub same: Vec<Vec<u32>>,
-    /// Counts of views on opposite sides of the person: left and right are exchanged.
+    /// Counts for two views on opposite sides of the person, so that left and right are swapped.
     pub exchanged: Vec<Vec<u32>>,
 }
 
@@ -113,8 +113,8 @@ impl Counts {
 
     /// Returns `p(type in first view, type in second view)` for every part.
     ///
-    /// The counts are extended by `weight` observations of independent types, so that rare pairs of types and rare
-    /// angles carry little information.
+    /// To the counts, `weight` observations of independent types are added, so that rare pairs of types and rare angles have little
+    /// influence.
     ///
     /// * `marginals`: frequency of every type of every part; see [`marginals`].
     pub fn joint(
@@ -162,7 +162,7 @@ impl Counts {
     }
 }
 
-/// Lift of two types: the logarithm of their frequency over the frequency of independent types.
+/// Returns the lift of each pair of types: the logarithm of its frequency over the frequency for independent types.
 fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, cols) = (joint.column_sum(), joint.row_sum());
     DMatrix::from_fn(joint.nrows(), joint.ncols(), |a, b| {

@@ -20,7 +20,7 @@ const SIZED: &str =
 
 /// The consistency parameters of one model.
 ///
-/// The file is a single JSON object; all fields are required, and others are refused.
+/// The file is a single JSON object; all fields are required, and unknown fields are rejected.
 ///
 /// | field | content |
 /// |---|---|
@@ -138,10 +138,10 @@ pub struct JointWeights {
     pub weights: Vec<Vec<f64>>,
 }
 
-/// Reason why a text is not a consistency file.
+/// Reason why a text was rejected as a consistency file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The text is not JSON of this layout.
+    /// The text is not JSON with the expected fields.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// The text has another format or another version.
@@ -152,7 +152,7 @@ pub enum FileError {
         /// Version in the text.
         version: u32,
     },
-    /// A value is out of range, or of the wrong size.
+    /// A value is out of range or has the wrong size.
     #[error("`{field}` is not {expected}")]
     Value {
         /// Name of the field.

@@ -1,4 +1,4 @@
-//! The file beside a model that defines where joints are relative to its parts.
+//! The file, stored beside a model, that defines the positions of joints relative to the model's parts.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ const SUM_TOLERANCE: f64 = 1e-6;
 
 /// Positions of the joints of `skeleton::PARSE14` relative to the parts of one model.
 ///
-/// The file is a single JSON object; all fields are required, and others are refused.
+/// The file is a single JSON object; all fields are required, and unknown fields are rejected.
 ///
 /// | field | content |
 /// |---|---|
@@ -73,16 +73,16 @@ pub struct LearnedSet {
     pub people: u64,
     /// Number of people who were found.
     pub found: u64,
-    /// Mean error of the parts themselves.
+    /// Mean error if the joints are taken to be the parts themselves.
     pub error_before: f64,
     /// Mean error of the joints on people who were left out of the learning.
     pub error_after: f64,
 }
 
-/// Reason why a text is not a file of joints.
+/// Reason why a text was rejected as a file of joints.
 #[derive(Debug, thiserror::Error)]
 pub enum JointFileError {
-    /// The text is not JSON of this layout.
+    /// The text is not JSON with the expected fields.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// The text has another format or another version.
@@ -93,7 +93,7 @@ pub enum JointFileError {
         /// Version in the text.
         version: u32,
     },
-    /// A value is out of range, or of the wrong size.
+    /// A value is out of range or has the wrong size.
     #[error("`{field}` is not {expected}")]
     Value {
         /// Name of the field.

@@ -5,7 +5,7 @@ use skeleton::{JointSet, MIRROR, N_PARTS};
 
 use crate::learned::JointWeights;
 
-/// One person in one picture: the detected parts, named by the side of the body, and a true joint.
+/// One person in one picture: the detected parts, named by the person's left and right, and a true joint.
 #[derive(Debug, Clone, Copy)]
 pub struct JointSample<'a> {
     /// Centres of the 26 parts, in pixels.
@@ -112,8 +112,8 @@ impl JointFit {
         row.map(|(weight, own)| rounded(weight + left * own)).collect()
     }
 
-    /// Returns the mean squared error of another fit's maps on the samples of this one, in units of the person's size;
-    /// `None` without samples.
+    /// Returns the mean squared error, on the samples of this fit, of the maps of another fit, in units of the person's size; `None`
+    /// without samples.
     pub fn error_of(&self, other: &Self, ridge: f64) -> Option<f64> {
         let n: f64 = self.joints.iter().map(|joint| joint.n).sum();
         let error = |joint: &Normal| {

@@ -42,11 +42,11 @@ pub struct ViewObservation {
     pub centres: Vec<[f64; 2]>,
     /// Error of every part, in tenths of the person's size.
     pub errors: Vec<f32>,
-    /// True if left and right are exchanged according to the ground truth: the person is seen from behind.
+    /// True if, according to the ground truth, the person is seen from behind, so that left and right are swapped.
     pub exchanged: bool,
     /// Size of the person, in pixels.
     pub size: f64,
-    /// The true joints of the joint set, in pixels; `None` for an unknown joint.
+    /// The true joints of the joint set, in pixels; `None` for a joint that is not annotated.
     pub joints: Vec<Option<[f64; 2]>>,
 }
 
@@ -64,7 +64,7 @@ pub struct Pair<'a> {
 /// Reason why nothing was learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LearnError {
-    /// No view was close enough to the truth.
+    /// In no view was the pose close enough to the truth.
     #[error("none of the {views} views is near the true pose, so nothing can be learned from them")]
     Nothing {
         /// Number of views seen.
@@ -182,8 +182,8 @@ impl Learner {
         &self.joints
     }
 
-    /// Returns the mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a,
-    /// b) / (p(a) p(b))`; above 0 if the tables are informative.
+    /// Returns the mean lift of another learner's types under the tables of this one: the mean over all parts of `ln p(a, b) / (p(a)
+    /// p(b))`. It is above 0 if the tables are informative.
     pub fn lift_on(&self, other: &Self) -> Option<f64> {
         let marginals =
             crate::learned::marginals(&self.shape, &self.ring.iter().collect::<Vec<_>>());

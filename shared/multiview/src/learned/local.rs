@@ -7,7 +7,7 @@ use skeleton::{MIRROR, N_PARTS, PARENT, PARSE14};
 const N_JOINTS: usize = 14;
 /// Parts of shoulders and hips; for each of these, the opposite part is used as well.
 const ACROSS_TRUNK: [usize; 4] = [2, 9, 14, 21];
-/// Maximum error that counts, as a share of the person's size; a joint with a larger error was not found at all.
+/// Maximum error that counts, as a fraction of the person's size; a joint with a larger error is taken as not found.
 const LIMIT: f64 = 0.1;
 /// Maximum number of rounds of reweighting, and the change of weights at which the rounds end.
 const MOST_ROUNDS: usize = 50;
@@ -42,10 +42,10 @@ impl Local {
 
     /// Learns a row of weights, one per part, for every joint of `skeleton::PARSE14`; rows sum to 1.
     ///
-    /// A joint is its own part plus a weighted sum of the offsets of the parts around it. So the map does not change if
-    /// people are moved, rotated or scaled. Every data set has the same weight, because data sets define joints
-    /// differently. The mirror image of every person is added as well, so the map is symmetric. Errors beyond a
-    /// tenth of a person's size are ignored (Tukey's biweight): there, the limb was not found.
+    /// A joint is its own part plus a weighted sum of the offsets of the parts around it. So the map is the same if people are moved,
+    /// rotated or scaled. Every data set has the same weight, because data sets define joints differently. The mirror image of every person
+    /// is added as well, so the map is symmetric. Errors beyond a tenth of a person's size are ignored (Tukey's biweight), because the limb
+    /// was not found.
     pub fn learn(self, sets: &[Vec<&Marked>]) -> Vec<Vec<f64>> {
         let mut rows = vec![Vec::new(); N_JOINTS];
         for joint in 0..N_JOINTS {
@@ -128,7 +128,7 @@ pub fn mean_error(rows: Option<&[Vec<f64>]>, people: &[&Marked]) -> Option<f64> 
     (!people.is_empty()).then(|| people.iter().map(of_person).sum::<f64>() / people.len() as f64)
 }
 
-/// One of [`Local::tried`], with its errors on every data set for people who were left out of the learning.
+/// One of [`Local::tried`], with its errors on every data set, measured on people who were left out of the learning.
 pub type Tried = (Local, Vec<f64>);
 
 /// Tries all settings with cross-validation: every fifth person of each data set is left out in turn.

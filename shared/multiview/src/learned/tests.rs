@@ -36,7 +36,7 @@ fn learned(learner: &Learner) -> Learned {
     learner.learned("0".repeat(16), weights, rig, Some(0.01)).unwrap()
 }
 
-/// Adds two views at an angle, `n` times.
+/// Adds a pair of views with a given angle between them, `n` times.
 fn add_views(learner: &mut Learner, views: [&ViewObservation; 2], degrees: f64, n: usize) {
     for _ in 0..n {
         learner.add_view(views[0], &PARSE14);

@@ -52,7 +52,7 @@ fn camera(degrees: f64) -> Camera {
     }
 }
 
-/// A view whose map of a joint is a single bump; the view does not see joints that are `None`.
+/// A view whose map of a joint is a single peak; the view does not see joints that are `None`.
 struct Bumps {
     at: [Option<[f64; 2]>; N],
     maxima: Vec<Vec<([f64; 2], f32)>>,
@@ -216,7 +216,7 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
         });
         let views: Vec<SpaceView<'_>> = views.collect();
         let mut found = solve_person(&views, &settings).unwrap().pose;
-        // The names in the result follow the first view.
+        // Left and right in the result are named as in the first view.
         if exchanged & 1 == 1 {
             for [right, left] in LIMBS.into_iter().flatten() {
                 found.joints.swap(right, left);
@@ -233,7 +233,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
         as_seen: true,
         ..SpaceSettings::default()
     };
-    // The body is flat and symmetric: facing x and facing y look the same from here except for the names.
+    // The body is flat and symmetric: from here, a person facing x and one facing y look the same except for the names of left and right.
     let mut flat = STANDING.map(|[_, y, z]| [0.0, y, z]);
     for [right, left] in LIMBS.into_iter().flatten() {
         flat[right] = [0.0, -flat[left][1], flat[left][2]];
@@ -241,7 +241,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
     let cameras = [45.0, 135.0, 225.0, 315.0].map(camera);
     let bumps = cameras.each_ref().map(|camera| {
         let mut seen = Bumps::of_joints(camera, &flat);
-        // The side on the left of the picture is named right.
+        // The side that appears on the left of the picture is named right.
         for [right, left] in LIMBS.into_iter().flatten() {
             if seen.at[right].unwrap()[0] > seen.at[left].unwrap()[0] {
                 seen.at.swap(right, left);
@@ -333,7 +333,7 @@ fn whoever_is_the_same_person_in_most_views_is_chosen() {
     assert_eq!(same_person(&[], false), []);
 }
 
-/// A view whose network cannot distinguish the two ankles, nor the two knees, and sees the left leg better in both maps.
+/// A view whose network cannot distinguish the left and right ankles or knees, and sees the left leg better in both maps.
 struct EitherLeg(Bumps);
 
 impl EitherLeg {
@@ -386,7 +386,7 @@ fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
 
 #[test]
 fn legs_that_are_together_stay_together() {
-    // Both maps show one place only, so there is no other leg to find.
+    // Both maps have a peak at the same place only, so there is no other leg to find.
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::new);
     for view in &mut bumps {

@@ -1,5 +1,4 @@
-//! Independent computation of the energies: the paper's from eq. 1, 3, 4 and 6, the program's from
-//! its description.
+//! Independent computation of the energies: of the paper's energy from eq. 1, 3, 4 and 6, and of the program's energy from its description.
 
 use fmp::Pose;
 use geometry::epipolar;
@@ -122,7 +121,8 @@ pub(crate) fn released(
     sum
 }
 
-/// Returns true if a part of the support is on: it is good enough, or both are bad but it is clearly better.
+/// Returns true if a part of the support is on: either it is good enough, or the part is bad in both views but clearly better in the
+/// support.
 ///
 /// * `parts`: indices of the part in the support and in the target.
 fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usize; 2]) -> bool {
@@ -132,7 +132,7 @@ fn is_supporting(scene: &Scene, settings: &Settings, support: usize, parts: [usi
     here || (!there && sigma(0) < sigma(1) - settings.rescue_px[parts[0]])
 }
 
-/// Returns the heat of the line of a support at `pixel` (counted from 1), at a part of the target.
+/// Returns the heat, at `pixel` (counted from 1) in the target, of the epipolar line of a part of the support.
 fn heat(scene: &Scene, target: usize, pose: &Pose, part: usize, pixel: [f64; 2]) -> f64 {
     let [here, there] = [target, 1 - target].map(|view| scene.views[view].plan.camera());
     let fundamental = epipolar::fundamental(there, here);

@@ -181,7 +181,7 @@ impl View {
         }
     }
 
-    /// The same image with the two sides of the model exchanged.
+    /// Swaps the two sides of the model in the image.
     pub(crate) fn mirrored(&mut self) {
         let layout = self.plan.layout();
         for level in 0..layout.levels.len() {
@@ -202,7 +202,7 @@ impl View {
     }
 }
 
-/// Returns the pose with the two sides of the model exchanged.
+/// Returns the pose with the two sides of the model swapped.
 pub(crate) fn mirrored(pose: &Pose) -> Pose {
     Pose {
         parts: MIRROR.map(|part| pose.parts[part]).to_vec(),
@@ -283,7 +283,7 @@ impl Scene {
     }
 }
 
-/// Settings with which parts can be off, the terms matter, and the iterations suffice.
+/// Settings in which parts can be off, the terms matter, and the iterations suffice.
 pub(crate) fn settings(seed: u64) -> Settings {
     let noise = &mut Noise(seed ^ 0xABCD);
     Settings {
@@ -302,7 +302,7 @@ pub(crate) const FROM_BEST: PairStart = PairStart {
     exchanged: false,
 };
 
-/// Returns a random pose on a random level, with its own score.
+/// Returns a random pose on a random level, with its score.
 fn pose(noise: &mut Noise, solver: &Solver, view: &View) -> Pose {
     let level = noise.pick(&view.levels);
     let level_layout = &view.plan.layout().levels[usize::from(level)];

@@ -68,10 +68,10 @@ fn a_part_that_is_off_in_the_support_adds_nothing_to_the_target() {
         };
         let found = scene.fuse(&settings, [0, 1], FROM_BEST);
         assert_eq!(found.active, [blind != 0; N_PARTS]);
-        // The view with the blind support gets the same result as it does alone.
+        // The view whose support is blind gets the same result as it gets alone.
         let alone = &scene.views[1 - blind].candidates[0];
         assert_eq!(parts(&found.poses[1 - blind]), parts(alone));
-        // The blind view has a support, unless no line meets its image.
+        // The blind view has a support, unless no epipolar line crosses its image.
         let gained = found.poses[blind].score - scene.views[blind].candidates[0].score;
         assert!(gained >= 0.0, "{gained}");
         n_supported += usize::from(gained > 0.0);

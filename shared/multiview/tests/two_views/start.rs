@@ -1,4 +1,4 @@
-//! The choice of candidates and exchanges, compared with all combinations.
+//! Compares the choice of candidates and swaps with all combinations.
 
 use multiview::{Settings, TypeTables, ViewInput, choose_start, rank_starts};
 use proptest::prelude::*;

@@ -12,7 +12,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Creates the share from the values of a frame.
+    /// Creates the contribution of a frame from its values.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let add = |share: Self, value: f64| Self {
             sum: share.sum + value,
@@ -36,7 +36,7 @@ pub struct Bootstrap {
     pub n_resamples: usize,
     /// Seed of the random numbers; the same seed gives the same interval.
     pub seed: u64,
-    /// Share of the resamples inside the interval, 0..1.
+    /// Fraction of the resamples inside the interval, from 0 to 1.
     pub confidence: f64,
     /// Number of consecutive frames that are drawn together. Neighbouring frames are correlated, so drawing them one by
     /// one gives intervals that are too narrow.

@@ -1,10 +1,10 @@
-//! The paper's histogram of improvements and deteriorations between two versions.
+//! The paper's histogram of improvements and deteriorations between two results.
 
 /// Histogram of differences of errors, `before - after`; positive differences are improvements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Changes {
     width: f64,
-    /// Counts of `[edge, edge + width)`; the outermost bins include everything beyond.
+    /// Number of differences in each bin `[edge, edge + width)`; the first and the last bin also count everything beyond them.
     bins: Vec<usize>,
     improved: usize,
     deteriorated: usize,

@@ -18,9 +18,9 @@ pub fn joint_errors(found: &[Option<Point>], truth: &[Option<Point>]) -> Vec<Opt
 
 /// Returns the found joints after the best alignment by rotation, translation and scale.
 ///
-/// The alignment minimises the sum of squared distances over all rotations (no mirroring), translations and scales
-/// (Umeyama 1991), using the joints that are both found and known. The remaining distances are the error of the pose regardless of
-/// position and size. Their mean is the Procrustes form of the MPJPE.
+/// The alignment minimises the sum of squared distances over all rotations (no mirroring), translations and scales (Umeyama 1991), using
+/// the joints that are both found and known. The remaining distances measure the error of the pose regardless of its position, orientation
+/// and size. Their mean is the Procrustes form of the MPJPE.
 ///
 /// * Returns `None` if fewer than three joints are both found and known, or the found joints are all at one place.
 pub fn aligned(found: &[Option<Point>], truth: &[Option<Point>]) -> Option<Vec<Option<Point>>> {

@@ -1,19 +1,20 @@
 //! Mean offsets of found joints along and across their bones, in shares of the person's height.
 //!
-//! PCP and PCK count joints that are close enough; they do not show whether a joint is always on the same side of its mark.
-//! A bone points outwards from the trunk to the joint at its end. *Along* is positive beyond the mark, seen from the
-//! trunk: a knee that is found too high on the thigh has a negative value. *Across* is positive away from the body if the
-//! limb hangs down: to the left in the picture for right limbs, to the right for left ones.
+//! PCP and PCK count joints that are close enough to their annotated positions; they do not show a systematic offset. A bone points
+//! outwards from the trunk to the joint at its end. *Along* is positive if the joint is found too far from the trunk: a knee that is found
+//! too high on the thigh has a negative value. *Across* is positive away from the body if the limb hangs down: to the left in the picture
+//! for right limbs, to the right for left ones.
 
 use crate::score::{Bootstrap, Share};
 
 /// Number of joints in `skeleton::PARSE14`.
 const N_JOINTS: usize = 14;
 
-/// Maximum distance of a found joint from its mark, as a share of the person's size; a joint beyond it has no offset.
+/// Maximum distance of a found joint from its annotated position, as a fraction of the person's size; a joint farther away counts as not
+/// found.
 pub const FOUND_WITHIN: f64 = 0.2;
 
-/// Start of the bone of every joint: the mean of these joints.
+/// Start of the bone that ends at each joint: the mean of these joints.
 const BONES: [&[usize]; N_JOINTS] = [
     &[1],
     &[2],
@@ -52,7 +53,7 @@ pub struct Offset {
     pub n_found: usize,
     /// Number of joints in total.
     pub n: usize,
-    /// Mean along and across the bone.
+    /// Mean offset along and across the bone.
     pub mean: [f64; 2],
     /// Confidence intervals of the means, by resampling people.
     pub interval: [[f64; 2]; 2],
@@ -118,7 +119,7 @@ fn of_person(
     })
 }
 
-/// Returns the standing height of a person, in the unit of the joints: from the top of the head over the neck to the hips, plus the longer
+/// Returns the standing height of a person, in the unit of the joints: from the top of the head via the neck to the hips, plus the longer
 /// leg.
 pub fn height<const D: usize>(joints: &[[f64; D]; N_JOINTS]) -> f64 {
     let distance = |a: [f64; D], b: [f64; D]| {

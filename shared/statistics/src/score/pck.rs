@@ -1,7 +1,7 @@
 //! Percentage of correct keypoints in one image.
 
-/// The reported groups of joints, with the joints (of `skeleton::PARSE14`) that are averaged. A group combines both sides, or
-/// the neck with the top of the head, as in Yang & Ramanan's released `eval_pck`.
+/// The reported groups of joints, with the joints (of `skeleton::PARSE14`) that are averaged. A group combines left and right, or the neck
+/// and the top of the head, as in Yang & Ramanan's released `eval_pck`.
 pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
     ("head", [12, 13]),
     ("shoulder", [8, 9]),
@@ -12,7 +12,7 @@ pub const PCK_GROUPS: [(&str, [usize; 2]); 7] = [
     ("ankle", [0, 5]),
 ];
 
-/// Returns which joints are found: those at most `share` of the person's size from the truth.
+/// Returns which joints are found, that is, at most `share` of the person's size from the truth.
 ///
 /// The size is the longer side of the rectangle around the true joints plus 1 px, since the pixels at both ends belong to it (Yang &
 /// Ramanan 2013, section 6.2, and their released code). They use a `share` of 0.1 for PARSE and 0.2 for BUFFY. A joint that is NaN in
@@ -34,11 +34,11 @@ pub fn joints_found<const N: usize>(
 
 /// Returns the best detection of the annotated person on an image where others may be detected as well.
 ///
-/// It is the detection with the highest score among those whose box covers more than `share` of the true box.
-/// The released evaluation uses a `share` of 0.3 for PCK, on detections before non-maximum suppression.
+/// This is the detection with the highest score among those whose box covers more than `share` of the annotated box. The released
+/// evaluation uses a `share` of 0.3 for PCK, on detections before non-maximum suppression.
 ///
 /// * `detections`: score and box `[x1, y1, x2, y2]` around all parts, in pixels.
-/// * `truth`: the true box, in pixels.
+/// * `truth`: the annotated box, in pixels.
 /// * Returns the index of the detection; `None` if no detection covers enough.
 pub fn best_covering(detections: &[(f64, [f64; 4])], truth: [f64; 4], share: f64) -> Option<usize> {
     let area =

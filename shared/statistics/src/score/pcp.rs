@@ -1,6 +1,6 @@
 //! Percentage of correctly detected parts in one image.
 
-/// A stick: its name, and the joints whose means are its two ends.
+/// A stick: its name, and the joints at each of its ends; an end is the mean of its joints.
 type Stick = (&'static str, &'static [usize], &'static [usize]);
 
 /// The ten sticks of the PARSE evaluation, with ends in `skeleton::PARSE14` order.
@@ -23,9 +23,9 @@ pub const PARSE_STICKS: [Stick; 10] = [
 /// Rule for judging the two ends of a stick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PcpRule {
-    /// Each end must be within half the stick's true length.
+    /// Each end must be within half the stick's true length of the true end.
     BothEnds,
-    /// The mean of the two distances must be within half the stick's true length.
+    /// The mean of the two ends' distances from the truth must be at most half the stick's true length.
     MeanOfEnds,
 }
 

@@ -17,8 +17,8 @@ pub struct Segment {
 
 /// The names of the segments that the paper judges, in the order of its tables.
 ///
-/// The text does not list the segments. The overall value in its comparison on subject 1
-/// (87.24) is the mean over these twelve rows of the same table, so shoulders and hips count too.
+/// The paper's text does not list the segments. But the overall PCP3D in its comparison on subject 1 (87.24 %) is the mean over these
+/// twelve rows of the same table, so shoulders and hips count too.
 pub const SEGMENT_NAMES: [&str; 12] = [
     "Head",
     "Shoulders",
@@ -94,7 +94,7 @@ const HUMANEVA20: Ends = [
 
 /// Returns the twelve segments between the joints of a set; `None` for an unknown set.
 ///
-/// If a set contains one point twice (such as the elbow as the end of both arm segments), its two joints are averaged.
+/// If a set has two joints for the same point (such as the elbow as the end of both arm segments), the two are averaged.
 pub fn segments(set: &JointSet) -> Option<[Segment; 12]> {
     let ends = match set.name {
         "parse14" => PARSE14,

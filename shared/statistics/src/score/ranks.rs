@@ -1,10 +1,10 @@
 //! Rank statistics: area under the ROC, and rank correlation.
 
-/// Returns the area under the receiver operating characteristic: the probability that a sample of the class scores above
-/// a sample that is not of the class, with ties counting half (Mann and Whitney).
+/// Returns the area under the receiver operating characteristic: the probability that a sample of the class scores above a sample that is
+/// not of the class, where ties count half (Mann and Whitney).
 ///
 /// * `samples`: score, and whether the sample is of the class.
-/// * Returns `None` if one kind of sample is missing, or if a score is NaN.
+/// * Returns `None` if all samples, or none, are of the class, or if a score is NaN.
 pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     let scores: Vec<f64> = samples.iter().map(|sample| sample.0).collect();
     let ranks = ranks(&scores)?;
@@ -14,9 +14,9 @@ pub fn area_under_roc(samples: &[(f64, bool)]) -> Option<f64> {
     (n > 0.0 && others > 0.0).then(|| (sum - n * (n + 1.0) / 2.0) / (n * others))
 }
 
-/// Spearman's rank correlation of two numbers; ties get the mean of their ranks.
+/// Returns Spearman's rank correlation of two quantities; ties get the mean of their ranks.
 ///
-/// * Returns `None` for fewer than two pairs, if either number is constant, or if one is NaN.
+/// * Returns `None` for fewer than two pairs, if either quantity is constant, or if a number is NaN.
 pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     let [first, second] = [
         pairs.iter().map(|pair| pair.0).collect::<Vec<f64>>(),

@@ -8,7 +8,7 @@ use crate::score::pcp::{PARSE_STICKS, Pcp, PcpRule, sticks_found};
 /// PCK thresholds, as shares of the person's size.
 pub const PCK_SHARES: [f64; 2] = [0.1, 0.2];
 
-/// PCP by both rules and PCK at both shares, per stick and per joint.
+/// PCP by both rules and PCK at both thresholds, per stick and per joint.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
     n_images: usize,
@@ -72,7 +72,7 @@ impl Report {
         }
     }
 
-    /// Returns the results with the sticks of both sides combined in one column each, as in publications, with their names.
+    /// Returns the results as in publications: left and right sticks are combined in one column; each column has a name.
     pub fn limbs(&self, rule: PcpRule) -> [(&'static str, Pcp); COLUMNS.len()] {
         COLUMNS.map(|(name, sticks)| {
             let sticks = sticks.iter().map(|&stick| self.sticks(rule)[stick]);
@@ -82,22 +82,22 @@ impl Report {
 
     /// Returns the result over all joints, which is the mean over [`PCK_GROUPS`].
     ///
-    /// * `share`: index into [`PCK_SHARES`].
+    /// * `share`: index of the threshold in [`PCK_SHARES`].
     ///
     /// # Panics
     ///
-    /// If there is no such share.
+    /// If there is no such threshold.
     pub fn pck(&self, share: usize) -> Pcp {
         sum(self.joints[share].iter().copied())
     }
 
     /// Returns the result of each of [`PCK_GROUPS`].
     ///
-    /// * `share`: index into [`PCK_SHARES`].
+    /// * `share`: index of the threshold in [`PCK_SHARES`].
     ///
     /// # Panics
     ///
-    /// If there is no such share.
+    /// If there is no such threshold.
     pub fn groups(&self, share: usize) -> [Pcp; PCK_GROUPS.len()] {
         PCK_GROUPS.map(|(_, joints)| sum(joints.iter().map(|&joint| self.joints[share][joint])))
     }
@@ -113,7 +113,7 @@ fn sum(counts: impl IntoIterator<Item = Pcp>) -> Pcp {
     total
 }
 
-/// Columns of the published tables: the sticks of both sides are combined.
+/// Columns of the published tables: left and right sticks are combined.
 const COLUMNS: [(&str, &[usize]); 6] = [
     ("torso", &[0]),
     ("u.leg", &[1, 2]),
@@ -124,7 +124,7 @@ const COLUMNS: [(&str, &[usize]); 6] = [
 ];
 
 impl fmt::Display for Report {
-    /// Writes a table of percentages, with one line for each rule and each share.
+    /// Writes a table of percentages, with one line for each rule of PCP and each threshold of PCK.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (n_images, n_missed) = (self.n_images, self.n_missed);
         write!(out, "{n_images} images, nothing found on {n_missed}")?;
