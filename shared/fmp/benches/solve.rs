@@ -1,6 +1,6 @@
-//! Benchmark of the best pose of 26 parts with six types each, on all levels of images of 172 x 224 and 640 x 480
-//! pixels in which one person stands out. It is solved by the view alone, and as one step of the alternation
-//! between two views: with and without shortcuts, with all terms changed and with one in five.
+//! Benchmark of finding the best pose of 26 parts with six types each, on all levels of images of 172 x 224 and 640 x 480 pixels in which
+//! one person stands out. The pose is computed from the view alone, and as one step of the alternation between two views. The step is
+//! measured with and without shortcuts, and with either all terms changed or one in five.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
@@ -83,7 +83,7 @@ fn fastest(mut call: impl FnMut()) -> f64 {
     (0..15).map(time).fold(f64::INFINITY, f64::min)
 }
 
-/// Terms that add a horizontal line through every part; the score falls with the distance from the line.
+/// Terms that add a horizontal line for every part; the score falls with the distance from the line.
 struct Lines<'a> {
     layout: &'a Layout,
     rows: Vec<f32>,
@@ -114,7 +114,7 @@ impl ExtraTerms for Lines<'_> {
     }
 }
 
-/// Returns a tree of limbs: the parent of every part is the part before it, or the part five before it.
+/// Returns the specification of a tree of limbs: the parent of each part is the part before it or the part five before it.
 fn spec() -> ModelSpec {
     let part = |part: usize| {
         let spring = |k: usize| Spring {
@@ -149,7 +149,7 @@ fn spec() -> ModelSpec {
     }
 }
 
-/// Noise with the spread of trained responses, and one place on one level where all parts respond.
+/// Returns noise with the spread of trained responses, except at one position of one level where all parts respond.
 fn planted(layout: &Layout) -> Vec<f32> {
     let mut noise = 1_u64;
     let mut next = || {

@@ -2,8 +2,8 @@
 
 /// For every level of a layout, the score of its best pose without the terms of other views.
 ///
-/// If the terms add at most a known gain, a level whose bound is below the score of some pose
-/// cannot contain the best pose and is skipped.
+/// If the terms add at most a known gain, a level is skipped if its bound plus the gain is below the score of a known pose, because it
+/// cannot contain the best pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds(Vec<Bound>);
 
@@ -27,7 +27,7 @@ impl Bound {
 impl Bounds {
     /// Creates the bounds from the bounds of some levels; the other levels are unknown.
     ///
-    /// * `n_levels`: number of levels, offered or not.
+    /// * `n_levels`: total number of levels, with or without responses.
     pub(crate) fn of_some(n_levels: usize, found: Vec<(u16, Bound)>) -> Self {
         let mut bounds = vec![Bound::UNKNOWN; n_levels];
         for (level, bound) in found {
@@ -36,25 +36,26 @@ impl Bounds {
         Self(bounds)
     }
 
-    /// Creates the bounds from values computed elsewhere, one per level of the layout, offered or not.
+    /// Creates the bounds from values computed elsewhere, one for each level of the layout, with or without responses.
     ///
     /// Bounds that are too low give wrong results, but do no other harm.
     pub fn new(of_levels: Vec<Bound>) -> Self {
         Self(of_levels)
     }
 
-    /// Returns the bound of every level, offered or not.
+    /// Returns the bound of every level, with or without responses.
     pub fn levels(&self) -> &[Bound] {
         &self.0
     }
 
-    /// Returns the number of levels, offered or not.
+    /// Returns the total number of levels, with or without responses.
     pub fn n_levels(&self) -> usize {
         self.0.len()
     }
 
-    /// Returns the upper bound of the score of a pose on a level under terms that add at most `gain` (the sum over the parts, and the sum
-    /// of its absolute values), for poses that score at least `lowest`. The bound is not finite if it is unknown.
+    /// Returns the upper bound of the score of a pose on a level, under terms that add at most `gain`, for poses that score at least
+    /// `lowest`. The two values of `gain` are the sum over the parts and the sum of the absolute values. The bound is not finite if it is
+    /// unknown.
     ///
     /// Rounding is monotone, so a computed score never exceeds the score computed with every term at
     /// its bound. That score differs from the sum computed here by rounding alone. A score takes
@@ -94,11 +95,10 @@ impl Upper {
         self.most < f64::from(lowest)
     }
 
-    /// Returns how much a pose may lose against the bound without scoring less than `lowest`.
+    /// Returns by how much a pose may fall short of the bound and still score at least `lowest`.
     ///
-    /// If one term of a pose has a given value, the bound of the pose is [`Self::most`], minus that
-    /// term's bound, plus the value. The value itself can be as large as the loss, and adds as much
-    /// rounding again.
+    /// If one term of a pose has a given value, the bound of the pose is [`Self::most`], minus that term's bound, plus the value. The value
+    /// itself can be as large as the shortfall, and adds as much rounding again.
     pub(crate) fn slack(&self, lowest: f32) -> f64 {
         self.most - f64::from(lowest) + self.rounding
     }

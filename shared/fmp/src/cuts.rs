@@ -1,4 +1,4 @@
-//! The parts of a chain's images that are needed for the features of a scope.
+//! The parts of the images of a chain of levels that are needed to compute the features of a scope.
 
 use std::ops::Range;
 
@@ -14,9 +14,9 @@ pub(crate) struct Cut {
 /// Computes the cuts of the levels `first`, `first + interval` and so on up to the last one of the scope,
 /// such that every cut has half the size of the one before it.
 ///
-/// A cut begins and ends at cell borders of its level, or at the border of the image, so that its cells are
-/// cells of the whole image. Features depend on the pixels up to two cells away, less at least one
-/// pixel. Halving corrupts up to two pixels along the border of a cut, which needs another cell.
+/// A cut begins and ends at cell borders of its level, or at the border of the image, so that its cells coincide with cells of the whole
+/// image. Features depend on the pixels up to two cells away, less at least one pixel. Halving corrupts up to two pixels along the border
+/// of a cut, so one more cell is added.
 pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
     let end = usize::from(source.scope.levels().end);
     let levels = (first..end).step_by(source.interval);
@@ -66,7 +66,7 @@ impl Cut {
     }
 }
 
-/// Pixels of a level on which the features of its window depend, if the level is in the scope.
+/// Returns the pixels of a level on which the features of its window depend, if the level is in the scope.
 ///
 /// * `axis`: 0 along the rows, 1 down the columns.
 fn needed(source: &Source<'_>, level: usize, axis: usize) -> Option<Range<usize>> {

@@ -1,4 +1,4 @@
-//! From pixels to the responses of every filter on every level.
+//! Computes the responses of every filter on every level from the pixels.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
@@ -10,16 +10,15 @@ use crate::pool::{Pool, in_pool, lock};
 use crate::source::Source;
 use crate::{Layout, Model, Scope};
 
-/// Computes filter responses. Stores everything that can be prepared once per model, and workspaces that
-/// are reused from frame to frame.
+/// Computes filter responses. Stores everything that can be prepared once for a model, and workspaces that are reused from frame to frame.
 #[derive(Debug)]
 pub struct Extractor {
     model: Arc<Model>,
     isa: Isa,
     bank: FilterBank,
     workspaces: Pool<Features>,
-    /// One workspace per thread. This is a stack instead of a [`Pool`]: the last workspace put back is taken first, while it is still in
-    /// the cache.
+    /// One workspace for each thread. This is a stack instead of a [`Pool`]: the workspace that was put back last is taken first, because
+    /// it is still in the cache.
     buffers: Mutex<Vec<CorrelateWorkspace>>,
 }
 
@@ -34,8 +33,8 @@ impl Extractor {
         Self::with(FilterBank::new, isa, model)
     }
 
-    /// Like [`Self::new`], but every response is the plain sum of its products. This is slower, and serves as a
-    /// comparison. See [`FilterBank::correlate`] for the maximum difference.
+    /// Like [`Self::new`], but every response is the plain sum of its products. This is slower, and serves as a reference for tests. See
+    /// [`FilterBank::correlate`] for the maximum difference.
     pub fn direct(model: Arc<Model>) -> Self {
         let isa = Isa::best();
         Self::with(FilterBank::direct, isa, model)
@@ -62,9 +61,9 @@ impl Extractor {
 
     /// Writes the responses of all filters on all levels of `layout` into `out`.
     ///
-    /// Inside a rayon pool, the work is distributed over its threads; elsewhere, it stays on the caller's thread.
-    /// The values are the same. Filters smaller than the largest filter have a response at the same cells
-    /// as the largest one, at the position of their own top-left cell.
+    /// Inside a rayon pool, the work is distributed over its threads; elsewhere, it stays on the caller's thread. The values are the same
+    /// in both cases. Filters smaller than the largest filter have responses at the same cells as the largest filter, each at the position
+    /// of the filter's top-left cell.
     ///
     /// * `out`: at least [`Layout::n_responses`] values, `[level][filter][row][col]`; all of them are overwritten. It may be in shared
     ///   memory.
@@ -76,13 +75,11 @@ impl Extractor {
         self.responses_in(image, layout, &Scope::whole(layout), out);
     }
 
-    /// Writes the responses of all filters on the cells of a scope into `out`; only their inputs are
-    /// computed.
+    /// Writes the responses of all filters on the cells of a scope into `out`. Only the features needed for these cells are computed.
     ///
-    /// Features are bit-identical to those of [`Self::responses`], except for the rounding of the
-    /// HOG shares if the side of a cell is not a power of two. Responses differ by at most
-    /// twice the bound of [`FilterBank::correlate`], because tiles begin elsewhere. A scope with the whole
-    /// image as its region gives results bit-identical to [`Self::responses`] on its levels.
+    /// Features are bit-identical to those of [`Self::responses`], except for rounding in the HOG weights if the side of a cell is not a
+    /// power of two. Responses differ by at most twice the bound of [`FilterBank::correlate`], because the tiles begin at other cells. A
+    /// scope with the whole image as its region gives results bit-identical to [`Self::responses`] on its levels.
     ///
     /// * `out`: at least [`Layout::n_values`] values, `[level][filter][row][col]` without gaps.
     ///
@@ -140,7 +137,7 @@ impl Extractor {
         self.workspaces.put_back(features);
     }
 
-    /// Reserves workspaces for every thread.
+    /// Reserves a workspace for every thread.
     fn reserve(&self, layout: &Layout, n_threads: usize) {
         let cols = layout.levels.iter().map(|level| level.cols).max().unwrap_or(0);
         let mut buffers = lock(&self.buffers);
@@ -151,8 +148,8 @@ impl Extractor {
         }
     }
 
-    /// Computes the responses of a part of the work. If the part is larger than a share, it is split in two halves that run
-    /// in parallel.
+    /// Computes the responses of a part of the work. If the part is larger than one unit of work, it is split into two halves that run in
+    /// parallel.
     ///
     /// * `out`: memory for the responses of this part only.
     fn correlate(
@@ -193,7 +190,7 @@ impl Extractor {
         area * self.bank.filters(part.panels.clone()).len()
     }
 
-    /// Splits the levels in two halves of about the same work; for a single level, splits the panels.
+    /// Splits the levels into two halves that need about the same work; splits the panels of filters if there is only one level.
     fn halves(&self, source: &Source<'_>, part: &Part) -> Option<[Part; 2]> {
         let Range { start, end } = part.levels;
         let cut = |levels: Range<usize>, panels: Range<usize>| Part { levels, panels };
@@ -212,7 +209,7 @@ impl Extractor {
     }
 }
 
-/// Minimum number of parts into which a thread's work is split, so that others can help.
+/// Minimum number of units into which a thread's work is split, so that other threads can take over some of them.
 const SHARES: usize = 4;
 
 /// Some levels and filters, with their responses stored without gaps.

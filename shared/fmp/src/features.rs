@@ -13,14 +13,13 @@ use crate::{N_CHANNELS, Scope};
 
 /// Features of all levels, with their buffers.
 ///
-/// The levels that come from one resized image by repeated halving are a chain; chains are
-/// independent. The first thread that needs a level of a chain computes the chain, while other threads that
-/// need it wait. So responses start as soon as their features exist, without a barrier. Buffers are
-/// reused from frame to frame.
+/// A chain consists of the levels that are made from one resized image by repeated halving; chains are independent. The first thread that
+/// needs a level of a chain computes the whole chain, while other threads that need it wait. So the computation of responses starts as soon
+/// as their features exist, without a barrier. Buffers are reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Features {
     chains: Vec<Chain>,
-    /// One arena per thread: the last one put back is taken first, while it is still in the cache.
+    /// One arena for each thread. The arena that was put back last is taken first, because it is still in the cache.
     arenas: Mutex<Vec<Arena>>,
 }
 
@@ -43,7 +42,7 @@ struct Arena {
     shrink: ShrinkWorkspace,
     hog: HogWorkspace,
     cuts: Vec<Cut>,
-    /// Features of a cut of the image, with the padding that the whole image would have.
+    /// Features of a part of the image, with the same padding as for the whole image.
     padded: Vec<f32>,
 }
 
@@ -92,7 +91,7 @@ impl Features {
 }
 
 impl Arena {
-    /// Reserves memory for every chain, so that any chain can use this arena.
+    /// Reserves enough memory for any chain, so that all chains can use this arena.
     fn reserve(&mut self, source: &Source<'_>) {
         let [width, height] = source.layout.image_size;
         self.image.reserve(width, height);
@@ -113,7 +112,7 @@ impl Arena {
         let levels = (first..source.layout.levels.len()).step_by(source.interval);
         maps.resize_with(levels.len(), Vec::new);
         cuts(source, first, &mut self.cuts);
-        // Images alternate between the two buffers, which are then put back for the next chain.
+        // Images alternate between the two buffers, which are then available for the next chain.
         let Self {
             shrink,
             hog,

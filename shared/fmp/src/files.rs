@@ -46,7 +46,7 @@ pub enum ModelFileError {
         /// Path of the file.
         path: PathBuf,
     },
-    /// The beginning of the file matches none of the formats.
+    /// The beginning of the file matches no known format.
     #[error(
         "{} is not a model: the file begins with \"{beginning}\", expected `PLXMODEL` (Parallax), `MATLAB 5.0` \
          (Yang & Ramanan) or `partsNbr` (the authors' text)",
@@ -58,7 +58,7 @@ pub enum ModelFileError {
         /// First characters of the file.
         beginning: String,
     },
-    /// A file in the authors' text format with an error.
+    /// A file in the authors' text format contains an error.
     #[error("the model file {} cannot be read", path.display())]
     Text {
         /// Path of the file.
@@ -74,7 +74,7 @@ pub enum ModelFileError {
         /// The error in the MATLAB file.
         source: mat::MatError,
     },
-    /// A damaged Parallax file, or a model that could not be encoded.
+    /// A Parallax file is damaged, or a model could not be encoded.
     #[error("{} is not a valid model file", path.display())]
     Own {
         /// Path of the file.
@@ -92,9 +92,9 @@ pub enum ModelFileError {
     },
 }
 
-/// Reads a model file of any of the formats, recognised by its first bytes.
+/// Reads a model file of any supported format; the format is recognised by the first bytes.
 ///
-/// A released model is named after the file, without its extension.
+/// A released model gets the name of the file, without the extension.
 ///
 /// # Errors
 ///

@@ -7,9 +7,9 @@ use crate::Model;
 /// The placement of a part on a level of the pyramid: its cell and its type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Placement {
-    /// Column of the response map: the filter's leftmost cell.
+    /// Column of the response map, which is that of the filter's leftmost cell.
     pub x: u16,
-    /// Row of the response map: the filter's topmost cell.
+    /// Row of the response map, which is that of the filter's topmost cell.
     pub y: u16,
     /// Type (mixture component) of the part, counted from 0.
     pub mixture: u8,
@@ -18,8 +18,8 @@ pub struct Placement {
 /// One level of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelLayout {
-    /// Side of a cell, in pixels of the original image: `cell_px * 2^(level / interval)`. It is computed as in the reference programs, bit
-    /// for bit; whole octaves are exact.
+    /// Side of a cell, in pixels of the original image: `cell_px * 2^(level / interval)`. It is bit-identical to the value in the reference
+    /// programs, and exact for whole octaves.
     pub scale: f64,
     /// Size `[width, height]` of the resized image, in pixels of the level.
     pub image_size: [usize; 2],
@@ -40,13 +40,13 @@ pub struct Layout {
     pub image_size: [usize; 2],
     /// The levels, full resolution first.
     pub levels: Vec<LevelLayout>,
-    /// Padding `[rows, cols]` without the extra ring, in cells: the largest filter minus 2.
+    /// Padding `[rows, cols]` in cells, without the extra ring of cells: the size of the largest filter minus 2.
     pub pad: [usize; 2],
     /// Number of filters of the model.
     pub n_filters: usize,
 }
 
-/// The error for an image without a level on which the model fits.
+/// The error for an image that is too small for the model on every level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the image is {width}x{height} pixels, but the smaller side needs at least {minimum}")]
 pub struct ImageTooSmall {
@@ -88,7 +88,7 @@ impl Layout {
         let mut offset = 0;
         for level in 0..n_levels {
             // The reference programs compute powers for the first octave, and halve them for every further octave. A running product would
-            // drift by a few units in the last place. A centre halfway between two pixels would then be rounded to the other pixel.
+            // differ by a few units in the last place, and a centre halfway between two pixels would then be rounded to the other pixel.
             let shrink = 1.0 / step.powf((level % spec.interval) as f64);
             let relative = shrink * 0.5_f64.powi((level / spec.interval) as i32);
             let image_size = if level < spec.interval {

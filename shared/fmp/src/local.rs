@@ -1,4 +1,4 @@
-//! Local scores of the parts of a pose.
+//! Measures how well each part of a pose fits locally.
 
 use crate::{Model, Pose, Responses};
 
@@ -8,13 +8,11 @@ const REACH: usize = 4;
 /// How well one part of a pose fits at its position, compared with other positions and types.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LocalScore {
-    /// Response of the part's filter at its place.
+    /// Response of the part's filter at its position.
     pub response: f32,
-    /// The response minus the mean response of the same filter over the searched cells among the surrounding
-    /// 9 x 9.
+    /// The response minus a mean response of the same filter: the mean over those of the surrounding 9 x 9 cells that were searched.
     pub contrast: f32,
-    /// The response minus the best response of the part's other types at the same place; 0 if the part has only
-    /// one type.
+    /// The response minus the best response of the part's other types at the same position; 0 if the part has only one type.
     pub margin: f32,
 }
 

@@ -38,7 +38,7 @@ pub enum Springs {
 /// The connection of a part to its parent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edge {
-    /// The parent's index; always smaller than the child's.
+    /// The connection between a part and its parent.
     pub parent: usize,
     /// Score of a pair of types, `[parent type][child type]`; `-inf` if the pair never occurs.
     pub bias: Vec<Vec<f64>>,
@@ -49,7 +49,7 @@ pub struct Edge {
 /// One part of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartSpec {
-    /// Name in tables and pictures.
+    /// Name used in tables and pictures.
     pub name: String,
     /// Index of the filter of every type; one entry per type.
     pub filter_of_type: Vec<usize>,
@@ -72,9 +72,9 @@ pub struct ModelSpec {
     pub interval: usize,
     /// Side of a feature cell, in pixels of its level.
     pub cell_px: usize,
-    /// Minimum score of the positives in training; detection uses `min(threshold, -1)`.
+    /// Minimum score of the positive examples in training; detection uses `min(threshold, -1)`.
     pub threshold: f64,
-    /// For every part, the part on the other side of the body; `None` if unknown.
+    /// For every part, the same part on the other side of the body; `None` if unknown.
     pub mirror: Option<Vec<usize>>,
 }
 
@@ -84,7 +84,7 @@ pub enum ModelError {
     /// The model has no parts.
     #[error("the model has no parts")]
     NoParts,
-    /// Part 0 is not the root, or is not the only root.
+    /// Part 0 has a parent, or another part has none.
     #[error("part {part} has {} parent: part 1 and only part 1 is the root", if *.part == 1 { "a" } else { "no" })]
     Root {
         /// The part in question, counted from 1.
@@ -115,9 +115,9 @@ pub enum ModelError {
     /// The size of an array does not match the header or other arrays.
     #[error("{what} of {whose} has {got} entries, expected {expected}")]
     Size {
-        /// Name of the array.
+        /// Name of the array in question.
         what: &'static str,
-        /// Part or filter, counted from 1.
+        /// The part or filter in question, counted from 1.
         whose: String,
         /// Number of entries found.
         got: usize,
@@ -129,7 +129,7 @@ pub enum ModelError {
     Limit {
         /// Name of the count.
         what: &'static str,
-        /// The model, or a part or filter, counted from 1.
+        /// The model, or the part or filter (counted from 1), to which the count belongs.
         whose: String,
         /// Value of the count.
         got: usize,
@@ -138,7 +138,7 @@ pub enum ModelError {
         /// Maximum accepted value.
         max: usize,
     },
-    /// A type of the parent forbids all types of the child, so no pose could contain it.
+    /// A type of the parent excludes all types of the child, so no pose can contain it.
     #[error("no type of part {part} goes with type {parent_type} of its parent")]
     DeadEnd {
         /// The part in question, counted from 1.
@@ -158,14 +158,14 @@ pub enum ModelError {
         /// Type of the part, counted from 1.
         own_type: usize,
     },
-    /// The mirror does not exchange parts in pairs, or does not preserve the tree.
+    /// The mirror permutation does not swap parts in pairs, or does not preserve the tree.
     #[error(
         "part {part} mirrors part {other}, but part {other} does not mirror it, or the tree differs"
     )]
     Mirror {
         /// The part in question, counted from 1.
         part: usize,
-        /// Mirror part, counted from 1.
+        /// Mirrored part, counted from 1.
         other: usize,
     },
     /// A number is not finite or too large, or a spring is not stiff enough.
@@ -173,7 +173,7 @@ pub enum ModelError {
     Value {
         /// Name of the number.
         what: &'static str,
-        /// Part or filter, counted from 1.
+        /// The part or filter in question, counted from 1.
         whose: String,
         /// Value of the number.
         value: f64,
@@ -187,7 +187,7 @@ pub enum ModelError {
 pub struct Model(ModelSpec);
 
 impl Model {
-    /// Maximum number of parts of a model.
+    /// Maximum number of parts in a model.
     pub const MAX_PARTS: usize = 64;
     /// Maximum number of types of a part.
     pub const MAX_TYPES: usize = 32;
@@ -238,7 +238,7 @@ impl Model {
         ]
     }
 
-    /// Detection threshold: the trained threshold, but never above -1 (the reference programs' rule).
+    /// Returns the detection threshold: the trained threshold, but never above -1, as in the reference programs.
     pub fn detection_threshold(&self) -> f64 {
         self.0.threshold.min(-1.0)
     }

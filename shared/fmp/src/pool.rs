@@ -4,15 +4,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crossbeam::queue::ArrayQueue;
 
-/// Maximum number of workspaces that are kept. This exceeds the number of threads of our machines; any callers beyond
-/// it only create new workspaces.
+/// Maximum number of workspaces that are kept. It exceeds the number of threads of our machines. If there are more callers, the only effect
+/// is that new workspaces are created.
 const MOST: usize = 256;
 
-/// Workspaces of one kind: a solution takes one when it begins, and returns it at the end.
+/// Workspaces of one kind: each solution takes a workspace when it begins, and returns it at the end.
 ///
-/// The pool is a lock-free queue, so threads that begin and end at the same time do not wait for each other. It is first in,
-/// first out. It suits workspaces that are taken once per call, but not those that are taken many times per frame and
-/// should be warm in the cache.
+/// The pool is a lock-free queue, so threads that begin and end at the same time do not wait for each other. It is first in, first out.
+/// This suits workspaces that are taken once per call. It does not suit workspaces that are taken many times per frame and should still be
+/// in the cache.
 #[derive(Debug)]
 pub(crate) struct Pool<T> {
     free: ArrayQueue<T>,
@@ -39,7 +39,7 @@ impl<T: Default> Pool<T> {
     }
 }
 
-/// Returns true if the caller runs inside a rayon pool, and so wants its threads to be used.
+/// Returns true if the caller runs inside a rayon pool, in which case the threads of the pool are used.
 pub(crate) fn in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }

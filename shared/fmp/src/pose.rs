@@ -1,4 +1,4 @@
-//! A pose in one image: the place and the type of every part.
+//! A pose in one image: the position and the type of every part.
 
 use crate::{Layout, Model, Placement};
 
@@ -65,8 +65,8 @@ impl Pose {
     }
     /// Returns true if the pose is far enough from all others.
     ///
-    /// * `min_separation`: minimum mean distance between the part centres of two poses, in units of the mean side of the boxes of
-    ///   both.
+    /// * `min_separation`: minimum mean distance between the part centres of two poses, in units of the mean side of the part boxes of both
+    ///   poses.
     pub fn is_apart(
         &self,
         others: &[Self],

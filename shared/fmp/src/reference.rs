@@ -1,8 +1,8 @@
 //! The whole single-view method in double precision, written for readability and comparison.
 //!
-//! It follows the reference programs stage by stage, including the order of sums that decides ties.
-//! It is about a hundred times slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver),
-//! which give the same results except for rounding. It only supports springs per child type.
+//! It follows the reference programs stage by stage, including the order of summation, which decides ties. It is about a hundred times
+//! slower than [`Extractor`](crate::Extractor) and [`Solver`](crate::Solver), which give the same results except for rounding. It only
+//! supports springs per child type.
 
 use kernels::{
     HogShape, Planes, Rgb8View, Template, correlate_f64, hog_f64, reduce_by_taps, resize_by_taps,
@@ -113,7 +113,7 @@ fn panic_on_pairs() -> ! {
 /// The solved tree of one level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// Score of the best tree at every cell of the root for every type of the root, bias included.
+    /// Score of the best tree for every cell and every type of the root, bias included.
     pub root: Vec<Vec<f64>>,
     /// The messages of every part to its parent; empty for the root.
     pub messages: Vec<Vec<Message>>,
@@ -164,7 +164,8 @@ pub struct ReferencePose {
 }
 
 impl Solution {
-    /// Returns the best score of the root, its cell and its type. Ties go to the first cell, then to the first type.
+    /// Returns the best score of the root, and the cell and type of the root that give it. Ties go to the first cell, then to the first
+    /// type.
     pub fn best(&self) -> (f64, usize, usize) {
         let n_cells = self.root.first().map_or(0, Vec::len);
         let mut best = (f64::NEG_INFINITY, 0, 0);

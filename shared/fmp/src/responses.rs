@@ -1,8 +1,8 @@
-//! The scores of every filter at every cell: the evidence of one image.
+//! The scores of every filter at every cell, which are the evidence of one image.
 
 use crate::{Bounds, Layout, Pose, Scope, Window};
 
-/// Responses of all filters on the offered levels.
+/// Responses of all filters on the levels that were made available.
 ///
 /// The array may be in shared memory; it is not copied.
 #[derive(Debug, Clone, Copy)]
@@ -54,8 +54,7 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// Adds the bounds of [`Solver::bounds`](crate::Solver::bounds), which are then not
-    /// computed again.
+    /// Adds the bounds from [`Solver::bounds`](crate::Solver::bounds), so that they need not be computed again.
     ///
     /// # Panics
     ///

@@ -13,10 +13,9 @@ pub struct Region {
     pub y: [u32; 2],
 }
 
-/// Some levels of a layout, and their cells in a region of the image.
+/// Some levels of a layout, and the cells of these levels in a region of the image.
 ///
-/// Placements are always counted in cells of the whole layout; only arrays with
-/// one value per cell are smaller.
+/// Placements are always counted in cells of the whole layout; only arrays with one value per cell are smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scope {
     /// First level, and one past the last.
@@ -93,7 +92,7 @@ impl Scope {
         })
     }
 
-    /// Returns all levels and the whole image.
+    /// Returns the scope of all levels and the whole image.
     pub fn whole(layout: &Layout) -> Self {
         let [width, height] = layout.image_size.map(|image_size| image_size as u32);
         Self {
@@ -118,8 +117,9 @@ impl Scope {
 }
 
 impl Layout {
-    /// Returns the cells of a level in a scope: those at which the centre of the largest filter is in the region, and the adjacent cells
-    /// outside it. If the region ends at the border of the image, all remaining cells are included. There is at least one cell.
+    /// Returns the cells of a level that are in a scope: the cells at which the centre of the largest filter is in the region, and the
+    /// adjacent cells outside the region. If the region ends at the border of the image, all remaining cells are included. There is at
+    /// least one cell.
     pub fn window(&self, scope: &Scope, level: usize) -> Window {
         let it = &self.levels[level];
         if scope.is_whole {

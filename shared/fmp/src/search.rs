@@ -1,4 +1,4 @@
-//! Searches single images with a model: extractor and solver together.
+//! Searches single images with a model, by means of an extractor and a solver.
 
 use std::sync::Arc;
 

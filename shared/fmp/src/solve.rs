@@ -1,5 +1,4 @@
-//! The exact solution of the tree by max-sum message passing, from the leaves to the root, and the
-//! backtracking.
+//! Finds the exact best tree by max-sum message passing from the leaves to the root, followed by backtracking.
 
 mod bounds;
 mod distinct;
@@ -24,17 +23,17 @@ pub use statistics::SolveStatistics;
 
 /// Terms that another view adds to the score of a part (the `xi` and `lambda` of eq. 3).
 ///
-/// Both terms are optional per part; a part without them is scored by this view alone.
+/// Each part may have either term, both or none; a part without terms is scored by this view alone.
 pub trait ExtraTerms: Sync {
-    /// Adds this part's position term to the scores of some cells, the same for every type.
+    /// Adds this part's position term, which is the same for every type, to the scores of some cells.
     ///
     /// Returns `false` and leaves `score` unchanged if the part has no position term.
     ///
-    /// * `score`: scores of the cells of the level starting at `first`, in row-major order. The term of a cell
-    ///   does not depend on which other cells are requested.
+    /// * `score`: scores of the cells of the level starting at `first`, in row-major order. The term of a cell must not depend on which
+    ///   other cells are requested.
     fn add_position(&self, part: usize, level: usize, first: usize, score: &mut [f32]) -> bool;
 
-    /// Returns the score added to every placement of this type of the part.
+    /// Returns the score that is added to every placement of the part with this type.
     fn of_type(&self, part: usize, mixture: usize) -> f32;
 
     /// Returns an upper bound of the sum of both terms for any placement of the part. The
@@ -43,8 +42,8 @@ pub trait ExtraTerms: Sync {
         f32::INFINITY
     }
 
-    /// Returns a key of everything on which the part's terms depend and that can change during the life of an
-    /// [`IncrementalSolver`]: equal keys mean equal terms. `None` if the terms can always change.
+    /// Returns a key for everything that determines the part's terms and can change during the life of an [`IncrementalSolver`]. Equal keys
+    /// mean equal terms. `None` means that the terms can change at any time.
     fn key(&self, _part: usize) -> Option<u64> {
         None
     }
@@ -55,14 +54,13 @@ pub trait ExtraTerms: Sync {
 pub struct CandidateSettings {
     /// Minimum score of a candidate, in the unit of the model's scores.
     pub threshold: f32,
-    /// Maximum share of a picked candidate's box that a later candidate may cover, 0..1.
+    /// Maximum fraction of a selected candidate's box that a later candidate may cover, from 0 to 1.
     pub overlap: f64,
     /// Maximum number of poses to return.
     pub max: usize,
 }
 
-/// Solves one tree on given evidence. Stores the prepared model and reusable
-/// workspaces.
+/// Finds the best tree for given evidence. Stores the prepared model and reusable workspaces.
 ///
 /// The score of a part is `(response + position term) + type term`. The messages of its children
 /// are added in descending order of the children, each as `((child + vertical) + horizontal) + bias`,
@@ -76,9 +74,10 @@ pub struct Solver {
     isa: Isa,
     /// The message rule of every part; `None` for the root.
     rules: Vec<Option<MessageRule>>,
-    /// Number of score planes before the planes of each part, followed by the total number.
+    /// For each part, the number of score planes before those of the part; the last entry is the total number.
     first_planes: Vec<usize>,
-    /// This is a list instead of a [`Pool`]: the best-fitting workspace for a level is taken, which a queue cannot search for.
+    /// This is a list instead of a [`Pool`], because the best-fitting workspace for a level is taken, and a queue cannot be searched for
+    /// it.
     workspaces: Mutex<Vec<Workspace>>,
     /// One list of part scores for every caller of [`Self::score`].
     scores: Pool<Vec<f32>>,
@@ -134,12 +133,11 @@ impl Solver {
         &self.model
     }
 
-    /// Returns the best pose over the offered levels, with the extra terms if there are any.
+    /// Returns the best pose over the levels that have responses, including the extra terms if there are any.
     ///
-    /// The result is exact among the poses whose parts are all on cells with values. Ties of the root go to the
-    /// lower level, then to the first cell in row-major order, then to the lower type (the
-    /// reference programs leave the first two open). Ties of a child go to the lower type, then to
-    /// the first column, then to the first row. `None` if no level is offered, or no pose is
+    /// The result is the exact best among the poses whose parts are all on cells with values. Ties of the root go to the lower level, then
+    /// to the first cell in row-major order, then to the lower type (the reference programs leave the first two open). Ties of a child go
+    /// to the lower type, then to the first column, then to the first row. Returns `None` if no level has responses, or if no pose is
     /// possible.
     ///
     /// # Panics
@@ -149,7 +147,7 @@ impl Solver {
         self.best_on(evidence, evidence.levels(), extra)
     }
 
-    /// Like [`Self::best`], over some levels; levels that are not offered are left out.
+    /// Like [`Self::best`], but only over some levels; levels without responses are left out.
     ///
     /// # Panics
     ///
@@ -223,14 +221,13 @@ impl Solver {
         score
     }
 
-    /// Counters of the incremental solutions so far.
+    /// Returns the counters of all incremental solutions so far.
     pub fn statistics(&self) -> SolveStatistics {
         self.tally.sums()
     }
 
-    /// Returns the number of levels on which messages have been computed so far, in solutions of any kind,
-    /// including unfinished ones. It shows progress during long computations, and may be read from
-    /// another thread.
+    /// Returns the number of levels on which messages have been computed so far, in solutions of any kind, including unfinished ones. The
+    /// number shows the progress of long computations, and may be read from another thread.
     pub fn n_sweeps(&self) -> u64 {
         self.n_sweeps.load(Ordering::Relaxed)
     }
@@ -270,7 +267,7 @@ impl Solver {
         );
     }
 
-    /// Computes all messages on every offered level of `levels`, and calls `answer` for each.
+    /// Computes all messages on every level of `levels` that has responses, and calls `answer` for each.
     fn sweep_levels<T: Send>(
         &self,
         evidence: &Responses<'_>,
@@ -295,18 +292,18 @@ impl Solver {
     }
 }
 
-/// A search for the best root over levels, which may be solved in any order and in parallel.
+/// A search for the best root over several levels, which may be solved in any order and in parallel.
 struct Search<'a> {
     solver: &'a Solver,
     evidence: &'a Responses<'a>,
     extra: Option<&'a dyn ExtraTerms>,
-    /// Counters of the work, if it is counted.
+    /// Counters of the work, if the work is counted.
     tally: Option<&'a Tally>,
-    /// The best root so far, with the workspace that contains its tree.
+    /// The best root so far, and the workspace that contains the tree of this root.
     best: Mutex<Option<(Root, Workspace)>>,
 }
 
-/// Puts the workspace of a level back.
+/// A function that puts the workspace of a level back.
 type PutBack<'a> = dyn Fn(u16, Workspace) + Sync + 'a;
 
 impl Search<'_> {
@@ -316,7 +313,7 @@ impl Search<'_> {
         best.as_ref().map_or(f32::NEG_INFINITY, |best| best.0.score)
     }
 
-    /// Returns true if a root of this score on this level would be the best so far.
+    /// Returns true if a root with this score on this level would be the best so far.
     fn wins(&self, score: f32, level: u16) -> bool {
         let best = lock(&self.best);
         let beats = |(root, _): &(Root, Workspace)| {

@@ -1,4 +1,4 @@
-//! Inputs from which the features of an image are computed.
+//! The inputs from which the features of an image are computed.
 
 use kernels::{HogShape, Isa, Rgb8View};
 

@@ -7,7 +7,7 @@ use crate::{Layout, Model, Pose, Region, Scope};
 pub struct FrameTime {
     /// Number of the frame among the processed frames.
     pub frame: u64,
-    /// Time of the frame in the footage, in seconds; `None` without a frame rate.
+    /// Time of the frame in the footage, in seconds; `None` if the frame rate is unknown.
     pub seconds: Option<f64>,
 }
 
@@ -23,18 +23,18 @@ impl From<u64> for FrameTime {
 /// Settings of the tracker.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackSettings {
-    /// Number of levels to search on either side of the last pose's level.
+    /// Number of levels that are searched on each side of the last pose's level.
     pub levels: u16,
     /// Search distance around the last pose's box, as a share of the box's longer side.
     pub margin: f64,
     /// Interval between full searches, in frames; 0 and 1 mean a full search in every frame.
     pub full_every: u64,
-    /// Maximum step between frames across which a pose is tracked; 1 means that no frame may be skipped.
+    /// Maximum difference between frame numbers across which a pose is tracked; 1 means that no frame may be skipped.
     pub max_gap: u64,
-    /// Maximum drop of the score below that of the last full search; a larger drop causes a full search of the same
-    /// frame.
+    /// Maximum drop of the score below that of the last full search. If the score drops further, the same frame is searched again in full.
     pub max_drop: f32,
-    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame rates, this distance exceeds `margin`.
+    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame rates, the resulting distance exceeds
+    /// `margin`.
     pub speed: f64,
     /// Maximum time between frames across which a pose is tracked, in seconds.
     pub max_gap_s: f64,
@@ -50,7 +50,7 @@ impl Default for TrackSettings {
             full_every: 10,
             max_gap: 2,
             max_drop: 0.3,
-            // 3.4 m per second for a person 1.7 m tall: hands and feet in fast walking.
+            // 3.4 m per second for a person 1.7 m tall, which is the speed of hands and feet in fast walking.
             speed: 2.0,
             max_gap_s: 0.25,
             full_every_s: 0.5,
@@ -60,10 +60,10 @@ impl Default for TrackSettings {
 
 /// Tracks the best pose from frame to frame and chooses where to search the next frame.
 ///
-/// The first frame is searched in full. A full search is also made if no pose was found, if frames were skipped, if the last full search is
-/// too long ago (in frames, or in seconds if a frame rate is known), or if frames are too far apart in time; see [`TrackSettings`].
-/// Otherwise, only the surroundings of the last pose are searched; a better pose elsewhere is found at the next full search. A frame
-/// without a pose, or with a score that has dropped, is searched again in full ([`Self::needs_full_search`]).
+/// The first frame is searched in full. A full search is also made in these cases (see [`TrackSettings`]): no pose was found, frames were
+/// skipped, frames are too far apart in time, or the last full search is too long ago (in frames, or in seconds if the frame rate is
+/// known). Otherwise, only the surroundings of the last pose are searched; a better pose elsewhere is found at the next full search. A
+/// frame in which no pose was found, or whose score has dropped, is searched again in full ([`Self::needs_full_search`]).
 ///
 /// The tracker uses no clock and no image: the same frames and poses give the same decisions.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -165,7 +165,7 @@ impl Last {
             && is_recent(settings.full_every_s)
     }
 
-    /// Returns the surroundings of this frame's pose, if any of it is inside the image.
+    /// Returns the surroundings of this frame's pose as a scope, if any part of them is inside the image.
     fn near(&self, settings: &TrackSettings, layout: &Layout, at: FrameTime) -> Option<Scope> {
         let [x1, y1, x2, y2] = self.around;
         let moved = seconds(self.at, at).map_or(0.0, |second| settings.speed * second);
@@ -189,7 +189,7 @@ impl Last {
     }
 }
 
-/// Returns the time between two frames, if both are known.
+/// Returns the time between two frames, if both times are known.
 fn seconds(from: FrameTime, to: FrameTime) -> Option<f64> {
     Some(to.seconds? - from.seconds?)
 }

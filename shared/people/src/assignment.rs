@@ -1,13 +1,13 @@
-//! Least-cost assignment of rows to columns, each row to at most one column.
+//! Assigns rows to columns at the lowest total cost, each row to at most one column.
 
 /// Cost of a forbidden pair.
 pub(crate) const NEVER: f64 = 1e6;
 
 /// Assigns rows to columns so that the sum of the costs is minimal.
 ///
-/// Uses shortest augmenting paths (Jonker & Volgenant 1987); the run time is cubic in the larger side.
+/// Uses shortest augmenting paths (Jonker & Volgenant 1987); the run time is cubic in the larger side of the matrix.
 ///
-/// * `cost`: returns the cost of a row and a column, at least 0; [`NEVER`] or more if the pair is forbidden.
+/// * `cost`: function that returns the cost of a row and a column, at least 0; [`NEVER`] or more if the pair is forbidden.
 /// * Returns the column of every row; `None` for an unassigned row.
 pub(crate) fn assign(
     n_rows: usize,

@@ -2,7 +2,7 @@
 
 use skeleton::body::{BONES, Joints, Kind};
 
-/// Maximum number of frames that a mean length counts for.
+/// Maximum number of frames by which a mean length is weighted.
 const MOST_FRAMES: f64 = 100.0;
 /// Minimum number of kinds of bones that two bodies must share to be compared.
 const LEAST_KINDS: usize = 6;
@@ -12,7 +12,7 @@ const LEAST_KINDS: usize = 6;
 pub struct Bones {
     /// Mean length of each kind of bone, in the order of `skeleton::body::Kind::ALL`; 0 if no bone of that kind was seen.
     pub mean_m: [f64; Kind::ALL.len()],
-    /// Number of frames that each mean counts for.
+    /// Number of frames by which each mean is weighted.
     pub n: [f64; Kind::ALL.len()],
 }
 

@@ -1,17 +1,18 @@
-//! Grouping of detections from different views that show one person.
+//! Groups detections from different views that show the same person.
 
 use crate::Frame;
 use crate::distance::between;
 use crate::frame::Place;
 
-/// Maximum mean distance between the rays of two detections of one person, in metres, after subtracting the stated deviation.
+/// Maximum mean distance between the rays of two detections of one person, in metres, after subtracting the deviation that the detector
+/// states.
 const GATE_M: f64 = 0.12;
 
-/// A detection that belongs to a person.
+/// A detection that is assigned to a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Member {
     pub(crate) at: Place,
-    /// Set if the view labels the person's right side as left.
+    /// True if the view labels the person's right side as left.
     pub(crate) is_exchanged: bool,
 }
 
@@ -24,8 +25,8 @@ struct Pair {
 
 /// Groups detections into people, largest groups first; each group has at most one detection per view.
 ///
-/// Pairs are joined in the order of their distance. Two groups are joined only if the mean over all pairs between them stays below the
-/// gate.
+/// Pairs of detections are joined in the order of their distance. Two groups are joined only if the mean distance over all pairs between
+/// them stays below the limit.
 ///
 /// * `free`: the detections that are not yet assigned to a person.
 pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
@@ -53,7 +54,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
         }
     }
     pairs.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-    // Group of every detection, and whether its sides are exchanged.
+    // Group of every detection, and whether its left and right are swapped.
     let mut group: Vec<usize> = (0..n).collect();
     let mut sides = vec![false; n];
     for pair in &pairs {
@@ -82,7 +83,7 @@ pub(crate) fn clusters(frame: &Frame, free: &[Place]) -> Vec<Vec<Member>> {
     groups
 }
 
-/// Returns true if two groups share no view and their mean distance is below the gate.
+/// Returns true if two groups share no view and their mean distance is below the limit.
 fn may_join(
     free: &[Place],
     distances: &[Option<f64>],

@@ -1,4 +1,4 @@
-//! Coarse joints of a person from the detections assigned to that person.
+//! Estimates a person's joints coarsely from the detections assigned to the person.
 
 use skeleton::body::{Covariances, Joints};
 
@@ -7,7 +7,7 @@ use crate::distance::{LEAST_JOINTS, named, to_person};
 use crate::sight::{Sight, meet};
 use crate::{Frame, N};
 
-/// A detection farther than this from the person that the other views see contradicts them: trimmed mean over the joints, in metres.
+/// Distance from the person seen by the other views above which a detection contradicts them: a trimmed mean over the joints, in metres.
 const CONTRADICTS_M: f64 = 0.15;
 
 /// A coarse estimate of a person.
@@ -54,7 +54,7 @@ pub(crate) fn coarse(frame: &Frame, members: &[Member]) -> Coarse {
     person
 }
 
-/// The detections that agree on a person, the resulting estimate, and the refused detections.
+/// The detections that agree on a person, the resulting estimate, and the rejected detections.
 pub(crate) struct Agreed {
     pub(crate) members: Vec<Member>,
     pub(crate) person: Coarse,
@@ -63,7 +63,7 @@ pub(crate) struct Agreed {
 
 /// Removes from a person the detections that contradict the others, the worst first.
 ///
-/// * `expected`: the person's expected joints; they decide between two detections that contradict each other.
+/// * `expected`: the person's expected joints; if two detections contradict each other, the one nearer to these joints is kept.
 pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&Joints>) -> Agreed {
     let mut refused = Vec::new();
     loop {
@@ -98,7 +98,7 @@ pub(crate) fn agree(frame: &Frame, mut members: Vec<Member>, expected: Option<&J
     }
 }
 
-/// Returns the number of joints, not counting the head, that at least two detections show.
+/// Returns the number of joints, not counting the head, that are visible in at least two detections.
 fn n_common(frame: &Frame, members: &[Member]) -> usize {
     let shows = |joint: usize| {
         let each = members

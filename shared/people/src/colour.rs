@@ -1,7 +1,7 @@
-//! Colours of people's trunks, by which a view tells people apart.
+//! Colours of people's trunks, by which people are told apart in a view.
 //!
-//! Cameras differ in exposure and white balance, so every view has its own colours. A view that has not seen a person often enough uses
-//! the colour over all views.
+//! Cameras differ in exposure and white balance, so every view has its own colours. If a view has not seen a person often enough, the mean
+//! colour over all views is used.
 
 use nalgebra::Vector3;
 
@@ -14,21 +14,21 @@ pub(crate) type Rgb = [f64; 3];
 
 /// Minimum weight of a new colour in the mean.
 const NEW_COLOUR: f64 = 0.1;
-/// A colour is known after this many frames; a new person may have been given the detections of others.
+/// Number of frames after which a colour is taken as known. Before that, a new person may have been given the detections of others.
 const KNOWN: u32 = 5;
-/// Light and shade change the brightness by up to this factor, which does not count as a difference.
+/// Light and shadow change the brightness by up to this factor; such a change does not count as a difference.
 const SHADE: f64 = 1.2;
 
 /// The colours of a person's trunk.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Colours {
-    /// One per view.
+    /// Mean colour in each view.
     views: Vec<Mean>,
-    /// Over all views.
+    /// Mean colour over all views.
     all: Mean,
 }
 
-/// A mean colour, and the number of colours that it is the mean of.
+/// A mean colour, and the number of colours that were averaged.
 #[derive(Debug, Clone, Copy, Default)]
 struct Mean {
     colour: Rgb,
@@ -84,7 +84,7 @@ impl Colours {
         Some(difference(own, frame.colour(at)?))
     }
 
-    /// Returns the mean of the differences of several detections; `None` if none is known.
+    /// Returns the mean difference of several detections from the person's colour; `None` if none is known.
     pub(crate) fn mean_difference(&self, frame: &Frame, members: &[Member]) -> Option<f64> {
         let each = members.iter().filter_map(|member| self.difference(frame, member.at));
         let (n, sum) = each.fold((0.0, 0.0), |(n, sum), by| (n + 1.0, sum + by));
@@ -92,7 +92,7 @@ impl Colours {
     }
 }
 
-/// Returns the distance between two colours, apart from a small difference in brightness.
+/// Returns the distance between two colours, ignoring a small difference in brightness.
 pub(crate) fn difference(a: Rgb, b: Rgb) -> f64 {
     let (a, b) = (Vector3::from(a), Vector3::from(b));
     let gain = (a.dot(&b) / b.norm_squared().max(f64::MIN_POSITIVE)).clamp(1.0 / SHADE, SHADE);

@@ -1,4 +1,4 @@
-//! Distances in space between the detections of two views, or between a detection and a person.
+//! Distances in space: between the detections of two views, or between a detection and a person.
 
 use nalgebra::Point3;
 use skeleton::body::Joints;
@@ -8,7 +8,7 @@ use crate::{MIRROR, N};
 
 /// Minimum number of joints that two detections must share to be compared.
 pub(crate) const LEAST_JOINTS: usize = 4;
-/// One in this many joints is ignored, farthest first: a limb may be covered, or belong to another person.
+/// One in this many joints is ignored, the farthest first: a limb may be hidden, or belong to another person.
 const TRIMMED: usize = 4;
 
 /// How well a detection fits a person or another detection.
@@ -16,9 +16,9 @@ const TRIMMED: usize = 4;
 pub(crate) struct Fit {
     /// Trimmed mean of the joints' distances, in metres; each is weighted by its heat over its variance.
     pub(crate) distance: f64,
-    /// Standard deviation of these distances as stated by the detector, in metres.
+    /// Standard deviation of these distances that follows from the detector's stated deviations, in metres.
     pub(crate) unknown: f64,
-    /// Set if the detection fits with left and right exchanged.
+    /// True if the detection fits with left and right swapped.
     pub(crate) is_exchanged: bool,
 }
 
@@ -66,7 +66,8 @@ fn trimmed(terms: impl Iterator<Item = Option<Term>>) -> Option<Mean> {
     })
 }
 
-/// Returns the better fit of the two side labellings; the exchanged one is tried only if views label sides as they appear in the picture.
+/// Returns the better of two fits, with left and right as labelled and swapped. Swapping is tried only if views name left and right as they
+/// appear in the picture.
 fn better(as_seen: bool, mean: impl Fn(bool) -> Option<Mean>) -> Option<Fit> {
     let fit = |is_exchanged: bool| {
         let mean = mean(is_exchanged)?;

@@ -18,7 +18,7 @@ pub(crate) struct Place {
 struct Prepared {
     sights: Sights,
     colour: Option<[f64; 3]>,
-    /// Index of the detection in the input.
+    /// Index of the detection in the input list.
     given: usize,
 }
 
@@ -54,7 +54,7 @@ impl Frame {
         self.views.len()
     }
 
-    /// Returns the number of views that have a detection.
+    /// Returns the number of views that have at least one detection.
     pub(crate) fn n_seeing(&self) -> usize {
         self.views.iter().filter(|view| !view.is_empty()).count()
     }
@@ -67,7 +67,7 @@ impl Frame {
         self.views[at.view][at.index].colour
     }
 
-    /// Returns the index of a detection among the input detections of its view.
+    /// Returns the index of a detection in the input list of its view.
     pub(crate) fn given(&self, at: Place) -> usize {
         self.views[at.view][at.index].given
     }

@@ -1,21 +1,22 @@
-//! Candidate places of a person's joint: places proposed by rays, each with its support from the views.
+//! Candidate positions of a person's joint: positions proposed by rays, each with its support from the views.
 
 use nalgebra::Point3;
 
 use crate::sight::{Prior, Sight, agreement, passing};
 
-/// Two rays propose no place if the distance between them exceeds this many standard deviations.
+/// Two rays propose no position if the distance between them exceeds this many standard deviations.
 const APART: f64 = 3.0;
-/// Maximum number of places for a joint.
+/// Maximum number of candidate positions for a joint.
 const MOST: usize = 12;
-/// Places closer together than this count as one, in metres.
+/// Positions closer together than this count as the same, in metres.
 const SAME_M: f64 = 0.02;
-/// Maximum distance of a joint from its expected place, in metres.
+/// Maximum distance of a joint from its expected position, in metres.
 const RADIUS_M: f64 = 0.6;
-/// A single view proposes a place if its ray passes this close to the expected place, in standard deviations of the expectation.
+/// A single view proposes a position if its ray passes the expected position within this distance, in standard deviations of the expected
+/// position.
 const BESIDE: f64 = 3.0;
 
-/// A joint seen by one view that may belong to a person.
+/// A keypoint of one view that may belong to a joint of the person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Candidate {
     pub(crate) view: usize,
@@ -25,20 +26,20 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// Returns how strongly the candidate supports a place.
+    /// Returns how strongly the candidate supports a position.
     pub(crate) fn support(&self, place: &Point3<f64>) -> f64 {
         self.trust * self.sight.heat * agreement(self.sight.deviations(place))
     }
 }
 
-/// A place and its support from the views.
+/// A position and its support from the views.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hypothesis {
     pub(crate) place: Point3<f64>,
     pub(crate) support: f64,
 }
 
-/// Returns the support of a place: the sum over the views of the strongest support by a candidate of that view.
+/// Returns the support of a position: the sum over the views of the strongest support from a candidate of that view.
 ///
 /// * `candidates`: sorted so that the candidates of one view are adjacent.
 pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
@@ -51,10 +52,10 @@ pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
         .sum()
 }
 
-/// Returns the candidate places of a joint, the best supported first.
+/// Returns the candidate positions of a joint, the best supported first.
 ///
 /// * `near`: centre of the search.
-/// * `prior`: the expected place.
+/// * `prior`: the expected position.
 pub(crate) fn hypotheses(
     candidates: &[Candidate],
     near: Option<Point3<f64>>,

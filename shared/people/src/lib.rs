@@ -1,9 +1,9 @@
 //! Identifies the people that several cameras see, and finds where their joints are.
 //!
 //! [`Tracker`] takes the output of a detector for every view of a frame: joints in pixels with their deviations. It groups the detections
-//! into people with lasting ids ([`Person`]). [`Solver`] takes these people and computes their joints. It uses everything that the views
-//! saw, not only what the detector combined into one detection. Distances are in metres and weighted by the stated deviations, so the same
-//! limits apply to every rig.
+//! into people with lasting ids ([`Person`]). [`Solver`] takes these people and computes their joints. It uses all keypoints of the views,
+//! not only those that the detector assigned to a person. Distances are in metres and weighted by the stated deviations, so the same limits
+//! can be used for every rig.
 //!
 //! The same input gives bit-identical results. The order of views and of detections has no effect: views are processed in the order of
 //! their cameras' names, and detections in the order of their pixel positions. The crate does not read the clock or any file.
@@ -66,7 +66,8 @@ pub struct Keypoint {
 pub struct Detection {
     /// The joints of `skeleton::PARSE14`, in its order; `None` where the joint was not found.
     pub joints: [Option<Keypoint>; N],
-    /// Colour of the trunk, each channel from 0 to 1; tells people apart who are close to each other, and recognises people who come back.
+    /// Colour of the trunk, each channel from 0 to 1. It distinguishes people who are close to each other, and identifies people who come
+    /// back.
     pub colour: Option<[f64; 3]>,
 }
 
@@ -75,8 +76,8 @@ pub struct Detection {
 pub struct View {
     /// The detected people.
     pub detections: Vec<Detection>,
-    /// Keypoints of each joint that the detector assigned to no person, in the order of `skeleton::PARSE14`; empty if the detector does not
-    /// report them.
+    /// For each joint, the keypoints that the detector assigned to no person, in the order of `skeleton::PARSE14`; empty if the detector
+    /// does not report such keypoints.
     pub loose: Vec<Vec<Keypoint>>,
 }
 
@@ -85,11 +86,11 @@ pub struct View {
 pub enum State {
     /// Reported for the first time in this frame.
     New,
-    /// Seen by enough views.
+    /// Seen by enough views to be tracked.
     Tracked,
     /// Seen by one view only, or too close to another person to tell the two apart.
     Unsure,
-    /// Not seen in this frame; the joints are at their expected places.
+    /// Not seen in this frame; the joints are at their expected positions.
     Lost,
 }
 
@@ -102,7 +103,8 @@ pub struct Person {
     pub state: State,
     /// Index of the person's detection in every view; `None` if the view does not show the person.
     pub detections: Vec<Option<usize>>,
-    /// For every view, true if it labels the person's right side as left; only if views label sides as they appear in the picture.
+    /// For every view, true if it labels the person's right side as left. This only occurs if views name left and right as they appear in
+    /// the picture.
     pub is_exchanged: Vec<bool>,
     /// Coarse positions of the joints, in metres in the world.
     pub joints: Joints,

@@ -1,4 +1,4 @@
-//! The state with which a tracker continues the work of another, also as plain numbers.
+//! The state with which a tracker continues the work of another; it can be converted to plain numbers.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use skeleton::body::{Covariances, Joints, Kind};
@@ -10,7 +10,7 @@ use crate::{N, State};
 
 /// Number of kinds of bones.
 const KINDS: usize = Kind::ALL.len();
-/// Id, joints, covariances, velocity, time, lengths and counts of the bones, colour.
+/// Numbers of a person: id, joints, covariances, velocity, time, lengths and counts of the bones, colour.
 const NUMBERS_OF_PERSON: usize = 1 + 3 * N + 9 * N + 3 + 1 + 2 * KINDS + 3;
 
 /// A person stored in a [`Memory`].
@@ -35,7 +35,7 @@ pub struct Remembered {
 /// The state with which a tracker continues the work of another.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Memory {
-    /// Highest id given so far; the next new person gets a higher id.
+    /// Highest id used so far; the next new person gets a higher id.
     pub last_id: u64,
     /// The people, including those who have left.
     pub people: Vec<Remembered>,

@@ -7,14 +7,14 @@ pub struct Settings {
     pub max: usize,
     /// Minimum number of views that must see a person, 2 or more.
     pub min_views: usize,
-    /// Set if the detector labels left and right as they appear in the picture, so that two views may disagree.
+    /// True if the detector labels left and right as they appear in the picture, so that two views may disagree.
     pub as_seen: bool,
     /// Minimum heat for a new person, 0 to 1: half of the joints must reach it in two views that agree on them.
     pub least_heat: f64,
 }
 
 impl Settings {
-    /// Returns true if detections may be false: some networks report a person in every box.
+    /// Returns true if detections may be false, because some networks report a person in every box.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.least_heat > 0.0
     }

@@ -7,7 +7,7 @@ use crate::{Detection, Keypoint, N};
 
 /// Minimum standard deviation of a view's joints in space, even where the picture is sharp, in metres.
 const FLOOR_M: f64 = 0.03;
-/// Smallest sine of the angle between two rays (3 degrees) at which they determine the distance of the joint.
+/// Smallest sine of the angle between two rays (3 degrees) at which the distance of the joint can be computed from them.
 const LEAST_SINE: f64 = 0.05;
 
 /// A joint as seen by a view.
@@ -51,8 +51,8 @@ impl Sight {
         self.spread * (point - self.origin).norm()
     }
 
-    /// Returns the standard deviation of the ray at the distance of a point, but at least the floor that applies even where the picture is
-    /// sharp.
+    /// Returns the standard deviation of the ray at the distance of a point, in metres. It is at least the minimum that applies even where
+    /// the picture is sharp.
     pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
         FLOOR_M.hypot(self.stated(point))
     }
@@ -68,7 +68,7 @@ impl Sight {
         self.origin + self.direction * along.max(0.0)
     }
 
-    /// Returns the ray's part of the normal equations for the joint: the inverse covariance across the ray.
+    /// Returns the contribution of the ray to the normal equations of the joint: the inverse covariance across the ray.
     pub(crate) fn information(&self, point: &Point3<f64>) -> Matrix3<f64> {
         let across = Matrix3::identity() - self.direction * self.direction.transpose();
         across / self.sd(point).powi(2)
@@ -130,8 +130,8 @@ const OUTLYING: f64 = 3.0;
 
 /// Triangulates the joint on which most of the rays agree, each weighted by its deviation and heat.
 ///
-/// Each pair of rays proposes a place. The place with the most support from the other rays is chosen, then moved to minimise the squared
-/// distances to the rays that agree with it.
+/// Each pair of rays proposes a position. The position with the most support from the other rays is chosen, and then moved to minimise the
+/// squared distances to the rays that agree with it.
 ///
 /// * `sights`: one for each view.
 /// * Returns `None` if no two rays agree.
@@ -163,7 +163,7 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     })
 }
 
-/// Returns the support for a place that is this many standard deviations away, 0 to 1.
+/// Returns the support, from 0 to 1, that a ray gives to a position at a distance of this many standard deviations.
 pub(crate) fn agreement(deviations: f64) -> f64 {
     (-0.5 * deviations * deviations).exp()
 }
@@ -176,7 +176,7 @@ pub(crate) struct Prior {
     pub(crate) sd: f64,
 }
 
-/// Returns the place with the smallest squared distances to the rays, weighted by their heats, and to the prior.
+/// Returns the position that minimises the squared distances to the rays, weighted by their heats, and to the prior.
 pub(crate) fn settle(sights: &[Sight], start: &Point3<f64>, prior: Option<Prior>) -> Option<Met> {
     let (mut normal, mut target) = (Matrix3::zeros(), Vector3::zeros());
     for sight in sights {

@@ -1,4 +1,4 @@
-//! Computes the joints of known people from everything that the views saw.
+//! Computes the joints of known people from all keypoints of the views.
 
 use std::collections::BTreeMap;
 
@@ -12,18 +12,19 @@ use crate::sight::{Prior, Sight, Sights, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
 use crate::{N, Person, View};
 
-/// Probability that a keypoint belongs to a person although the detector gave it to another person, or to nobody.
+/// Probability that a keypoint belongs to a person although the detector assigned it to another person, or to nobody.
 const TRUST_OTHERS: f64 = 0.3;
 const TRUST_LOOSE: f64 = 0.6;
-/// Standard deviation of a joint's expected place, in metres, and its growth with time, in metres per second.
+/// Standard deviation of a joint's expected position, in metres; the next constant is its growth with time, in metres per second.
 const EXPECTED_SD_M: f64 = 0.04;
 const EXPECTED_SD_M_PER_S: f64 = 1.5;
-/// Weight of a new velocity in the stored velocity, and of the stored velocity in the expected place.
+/// Weight of a new velocity in the stored velocity; the next constant is the weight of the stored velocity in the expected position.
 const NEW_VELOCITY: f64 = 0.5;
 const DAMPING: f64 = 0.5;
-/// How long a joint that no view sees is still reported at its expected place, in seconds.
+/// Time for which a joint that no view sees is still reported at its expected position, in seconds.
 const CARRIED_S: f64 = 1.0;
-/// Cost of a place per half squared standard deviation from the expected place of the joint, and the maximum of this cost.
+/// Cost of a candidate position for each half squared standard deviation from the joint's expected position; the next constant is the
+/// maximum of this cost.
 const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
 /// Rays farther from the joint than this many standard deviations are ignored.
@@ -40,7 +41,7 @@ pub struct Solved {
     pub joints: Joints,
     /// Covariances of the joints, in square metres.
     pub covariances: Covariances,
-    /// Number of views that agree on each joint; 0 if the position is only an expectation.
+    /// Number of views that agree on each joint; 0 if only the expected position is known.
     pub n_views: [usize; N],
 }
 
@@ -74,11 +75,11 @@ impl Knowledge {
 
 /// Computes the joints of known people, frame by frame.
 ///
-/// The candidate places of a joint are where suitable rays meet. These are the rays of the person's detections and, with less trust, rays
-/// that the detector gave to other people or to nobody. The solver chooses one place for each joint. It weighs three criteria: the support
-/// by the views, the distance from the expected place, and the bone lengths of a person of this stature. The choice is exact over the tree
-/// of the body. Then every joint moves to minimise the squared distances to its rays. Finally, the bone lengths correct the joints in
-/// proportion to their uncertainty.
+/// The candidate positions of a joint are the points where suitable rays meet. These are the rays of the person's detections and, with a
+/// lower weight, rays that the detector assigned to other people or to nobody. The solver chooses one position for each joint, by three
+/// criteria: the support from the views, the distance from the expected position, and the bone lengths of a person of this stature. The
+/// choice is exact over the tree of the body. Then every joint moves to minimise the squared distances to its rays. Finally, the bone
+/// lengths correct the joints in proportion to their uncertainty.
 #[derive(Debug, Clone)]
 pub struct Solver {
     cameras: Vec<Camera>,
@@ -86,7 +87,7 @@ pub struct Solver {
     known: BTreeMap<u64, Knowledge>,
 }
 
-/// Everything that a view shows, as rays.
+/// All keypoints of a view, as rays.
 struct Rays {
     detections: Vec<Sights>,
     loose: Vec<Vec<Sight>>,
@@ -164,7 +165,7 @@ impl Solver {
     }
 }
 
-/// Converts a place to a weighted choice for a joint.
+/// Converts a candidate position to a weighted choice for a joint.
 fn choice(place: &Hypothesis, prior: Option<Prior>) -> Choice {
     let moved = prior.map_or(0.0, |prior| {
         let z = (place.place - prior.point).norm() / prior.sd;
@@ -205,7 +206,8 @@ fn remember(known: &mut Knowledge, time_s: f64, solved: &Solved) {
     known.time_s = time_s;
 }
 
-/// Moves a joint to minimise the squared distances to the rays that support its place; also returns its covariance and the number of views.
+/// Moves a joint to minimise the squared distances to the rays that support its position; also returns its covariance and the number of
+/// these views.
 fn refined(
     candidates: &[Candidate],
     start: Point3<f64>,

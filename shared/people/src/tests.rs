@@ -48,8 +48,7 @@ fn follow(n_views: usize, frames: &[Vec<View>]) -> Vec<Vec<Person>> {
     frames.map(|(nth, views)| tracker.step(nth as f64 / RATE_HZ, views)).collect()
 }
 
-/// Two people who stand side by side, and exchange their places while nobody sees them. Returns the ids from left to right, before and
-/// after.
+/// Returns the ids of two people, from left to right, before and after they swap positions while no camera sees them.
 ///
 /// * `colours`: colours of their trunks.
 fn exchanged(colours: [Option<[f64; 3]>; 2]) -> [Vec<u64>; 2] {
@@ -166,7 +165,7 @@ proptest! {
                 for (view, detection) in person.detections.iter().enumerate() {
                     prop_assert!(detection.is_none_or(|detection| taken.insert((view, detection))));
                 }
-                // A newly reported person has either the next id or a known id.
+                // A newly reported person has either the next free id or a known id.
                 prop_assert!(known.contains(&person.id) || person.id == last + 1);
                 last = last.max(person.id);
                 known.insert(person.id);
@@ -178,7 +177,7 @@ proptest! {
 
     #[test]
     fn a_tracker_that_takes_up_the_work_of_another_goes_on_with_the_same_people(seed in any::<u64>(), n_people in 1_usize..5) {
-        // All people are there from the start, so no track is about to be confirmed.
+        // All people are present from the start, so no track is about to be confirmed.
         let actors: Vec<Actor> = (0..n_people).map(|nth| Actor { at: [nth as f64 - 1.5, 0.3], turn: nth as f64, stature: 1.7 }).collect();
         let mut random = Rng::with_seed(seed);
         let frames: Vec<_> = (0..12).map(|_| seen(&ring(4), &actors, 3.0, &mut random)).collect();

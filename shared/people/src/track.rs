@@ -1,4 +1,4 @@
-//! The track of a person from frame to frame.
+//! Tracks one person from frame to frame.
 
 use nalgebra::{Point3, Vector3};
 use skeleton::body::Joints;
@@ -16,23 +16,25 @@ const TRUNK: [usize; 5] = [2, 3, 8, 9, 12];
 const DAMPED_S: f64 = 0.3;
 /// Weight of a new velocity in the stored velocity.
 const NEW_VELOCITY: f64 = 0.5;
-/// Maximum distance of detections from a person's expected place, in metres, and its growth for every second without a sighting.
+/// Maximum distance of detections from a person's expected position, in metres; the next constant is its growth for every second without a
+/// sighting.
 const REACH_M: f64 = 0.25;
 const REACH_M_PER_S: f64 = 0.5;
 const LONGEST_S: f64 = 1.0;
-/// Rays that pass this close to a joint show it at the same place, in metres.
+/// Rays that pass within this distance of a joint show it at the same position, in metres.
 const SAME_PLACE_M: f64 = 0.15;
-/// If frames are farther apart than this, in seconds, the reach grows by a running person's speed.
+/// Interval between frames, in seconds, above which the maximum distance of detections grows by the speed of a running person.
 const SOON_S: f64 = 0.1;
 const FAST_M_PER_S: f64 = 4.0;
-/// A glimpse keeps this share of the velocity, and shortens the time since the joints were last placed by the same share.
+/// Fraction of the velocity that remains after a glimpse (a detection in too few views to compute the joints). The time since the joints
+/// were last computed is shortened by the same fraction.
 const GLIMPSED: f64 = 0.5;
-/// Maximum distance by which a glimpse moves the person, in metres: one ray does not show how far away a person is.
+/// Maximum distance by which a glimpse moves the person, in metres; it is small because one ray does not show how far away a person is.
 const GLIMPSED_M: f64 = 0.1;
 /// A track becomes a person after sightings in this many of the last five frames.
 const FRAMES_OF_BIRTH: u32 = 3;
 const RECENT: u32 = 0b1_1111;
-/// A track with sightings in this many of the last eight frames is not a chance meeting of the rays of two moving people.
+/// A track with sightings in this many of the last eight frames is not the result of rays of two moving people that meet by chance.
 const FRAMES_OF_TWO_VIEWS: u32 = 6;
 const LONG: u32 = 0b1111_1111;
 
@@ -44,7 +46,7 @@ pub(crate) struct Track {
     pub(crate) coarse: Coarse,
     /// Velocity of the trunk, in metres per second.
     pub(crate) velocity: Vector3<f64>,
-    /// Time at which the joints were last placed, and time at which any view last saw the person, in seconds.
+    /// Time at which the joints were last computed, and time at which any view last saw the person, in seconds.
     pub(crate) placed_s: f64,
     pub(crate) seen_s: f64,
     /// Bit `n` is set if the person was seen `n` frames ago.
@@ -90,7 +92,7 @@ impl Track {
 
     /// Returns the number of views that see at least half of the joints clearly.
     ///
-    /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
+    /// * `least_heat`: minimum heat of a clearly visible joint, 0 to 1.
     pub(crate) fn n_clear(&self, frame: &Frame, least_heat: f64) -> usize {
         let is_clear = |member: &&Member| {
             let sights = frame.sights(member.at).iter().flatten();
@@ -99,9 +101,9 @@ impl Track {
         self.members.iter().filter(is_clear).count()
     }
 
-    /// Returns the number of joints that two views see clearly, and at the same place.
+    /// Returns the number of joints that two views see clearly and at the same position.
     ///
-    /// * `least_heat`: minimum heat of a joint that is seen clearly, 0 to 1.
+    /// * `least_heat`: minimum heat of a clearly visible joint, 0 to 1.
     pub(crate) fn n_well_seen(&self, frame: &Frame, least_heat: f64) -> usize {
         let is_well_seen = |joint: &usize| {
             let Some(place) = self.coarse.joints[*joint] else {
@@ -118,7 +120,7 @@ impl Track {
         (0..N).filter(is_well_seen).count()
     }
 
-    /// Starts a frame as not yet seen.
+    /// Begins a frame in which the person has not been seen yet.
     pub(crate) fn wait(&mut self) {
         self.history <<= 1;
         self.members.clear();
@@ -135,7 +137,7 @@ impl Track {
         (self.history & RECENT).count_ones() >= FRAMES_OF_BIRTH
     }
 
-    /// Returns true if the track was seen for long enough that two views suffice.
+    /// Returns true if the track was seen for so long that two views are enough.
     pub(crate) fn is_lasting(&self) -> bool {
         (self.history & LONG).count_ones() >= FRAMES_OF_TWO_VIEWS
     }
@@ -170,7 +172,8 @@ impl Track {
         self.state = State::Tracked;
     }
 
-    /// Updates the track from detections that place too few joints, such as those of a single view: the joints move towards the rays.
+    /// Updates the track from detections that are not enough to compute the joints, such as those of a single view: moves the joints
+    /// towards the rays.
     pub(crate) fn glimpse(&mut self, time_s: f64, frame: &Frame, members: Vec<Member>) {
         let expected = self.expected(time_s);
         let (mut sum, mut n) = (Vector3::zeros(), 0.0);

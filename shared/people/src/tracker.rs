@@ -16,41 +16,43 @@ use crate::{Frame, N, Person, State, View};
 
 /// Minimum number of joints of a new person, not counting the head.
 const LEAST_CORE: usize = 6;
-/// Minimum number of joints that place a known person, not counting the head.
+/// Minimum number of joints, not counting the head, from which the position of a known person is updated.
 const LEAST_SEEN: usize = 5;
 /// Two people whose trunks are closer than this cannot be distinguished, in metres.
 const ONE_M: f64 = 0.3;
-/// Extra distance at which a person who was not seen is searched for, in metres, added to the reach of single detections.
+/// Extra distance at which an unseen person is searched for, in metres, added to the maximum distance for single detections.
 const TAKEN_UP_M: f64 = 0.25;
-/// A new person is taken for a missed person within this distance, in metres, if the bones differ by less than this mean of the logarithms.
+/// Maximum distance, in metres, at which a new person can be a missed person; the next constant is the maximum mean difference of the
+/// logarithms of the bone lengths.
 const MISSED_M: f64 = 1.5;
 const OTHER_BONES: f64 = 0.15;
 /// A person is dropped after this time without being seen, in seconds.
 const DEATH_S: f64 = 1.0;
 /// A person can be recognised for this time after being dropped, in seconds.
 const REMEMBERED_S: f64 = 60.0;
-/// Limits for recognising a person: the mean difference of the logarithms of the bone lengths, the minimum number of frames, and the
-/// difference in the colour of the trunk.
+/// Limits for recognising a person: maximum mean difference of the logarithms of the bone lengths, minimum number of frames, and maximum
+/// difference of the trunk colours.
 const SAME_BONES: f64 = 0.06;
 const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
-/// Cost of a detection whose colour is nearer to that of another person within this distance, in metres: so many metres for each unit of
-/// the difference.
+/// Factor in the cost of a detection whose colour fits another person nearby better, in metres per unit of colour difference; the next
+/// constant is the maximum distance of that other person, in metres.
 const RIVAL_M: f64 = 2.0;
 const COLOUR_M: f64 = 2.0;
 /// A person is left without a detection rather than given one that costs more than this multiple of the largest reach.
 const UNSEEN: f64 = 2.0;
 /// A missed person is recognised by the colour of the trunk within [`MISSED_M`], if the colours differ by less than this.
 const SAME_CLOTHES: f64 = 0.12;
-/// Number of views that must see a new person, or all views if there are fewer.
+/// Number of views that must see a new person; in a smaller rig, all views must.
 const VIEWS_AT_ONCE: usize = 3;
 
 /// Identifies people frame by frame.
 ///
-/// 1. The tracker predicts where every known person is.
+/// 1. The tracker predicts the position of every known person.
 /// 2. In every view, it assigns detections to the people whose joints are nearest to the detections' rays.
 /// 3. It groups the remaining detections: detections of different views whose rays pass close to each other are one person.
-/// 4. A detection that contradicts its person goes back to step 3, once. A group without the bone lengths of a person is rejected.
+/// 4. A detection that contradicts its person goes back to step 3, at most once. A group whose bone lengths are impossible for a person is
+///    rejected.
 /// 5. A new person must be seen by three views, or by all views if there are fewer. The person is confirmed after three of five frames, or
 ///    at once if no known person is seen. A person who was not seen for a second is dropped. Within a minute, the tracker can recognise
 ///    this person by the bones and the colour of the trunk.
@@ -67,7 +69,7 @@ pub struct Tracker {
     last_s: Option<f64>,
 }
 
-/// The current frame, with the expected places of known people.
+/// The current frame, with the expected positions of known people.
 struct Now<'a> {
     frame: &'a Frame,
     time_s: f64,
@@ -131,7 +133,7 @@ impl Tracker {
             self.follow(&now, &mut free, &mut members, is_known);
         }
         self.place(&now, members, &mut free);
-        // Detections that contradict a group get a second chance to form one.
+        // Detections that contradict a group get a second chance to form a group.
         for _ in 0..2 {
             self.group(&now, &mut free);
         }
@@ -142,14 +144,13 @@ impl Tracker {
         self.people(&frame, &births)
     }
 
-    /// Returns true if a track has the same claim to detections as a known person. If detections are doubtful, this includes
-    /// tracks that have been seen for some frames. Otherwise a known person who is hidden would take the detections of a
-    /// person nearby.
+    /// Returns true if a track gets detections with the same priority as a known person. If detections are doubtful, this includes tracks
+    /// that have been seen for some frames. Otherwise, a known person who is hidden would take the detections of a person nearby.
     fn is_established(&self, track: &Track) -> bool {
         track.id.is_some() || self.settings.is_doubtful() && track.is_somebody()
     }
 
-    /// Assigns the detections of every view to the people.
+    /// Assigns the detections of every view to the known people.
     fn follow(
         &self,
         now: &Now<'_>,
@@ -205,7 +206,7 @@ impl Tracker {
         }
     }
 
-    /// Returns the cost of a detection whose colour is that of another person nearby rather than that of the track, in metres.
+    /// Returns the cost in metres of a detection whose colour fits another person nearby better than the track.
     fn by_colour(&self, now: &Now<'_>, track: usize, at: Place) -> f64 {
         let frame = now.frame;
         let Some(own) = self.tracks[track].colours.difference(frame, at) else {
@@ -231,7 +232,7 @@ impl Tracker {
             let n = agreed.members.len();
             let is_placed =
                 n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN;
-            // Rays of two different people can also meet.
+            // Rays to two different people can also meet.
             let is_nobody =
                 is_placed && n == 2 && self.settings.is_doubtful() && !agreed.person.is_body();
             if is_placed && !is_nobody {
@@ -264,7 +265,7 @@ impl Tracker {
         }
     }
 
-    /// Assigns a group to the person it shows: a person already placed, a missed person, or a new one.
+    /// Assigns a group to the person that it shows: a person already found in this frame, a missed person, or a new one.
     fn take(&mut self, now: &Now<'_>, members: Vec<Member>, person: &Coarse) {
         let &Now {
             frame,
@@ -331,14 +332,14 @@ impl Tracker {
         let is_known = |track: &Track| track.id.is_some() && track.state != State::Lost;
         let is_empty = !self.tracks.iter().any(is_known);
         let needed = VIEWS_AT_ONCE.min(frame.n_seeing()).max(2);
-        // A detector that reports people everywhere must be confident about a new person.
+        // If the detector reports people everywhere, a new person must be seen with high confidence.
         let is_doubtful = self.settings.is_doubtful();
         let is_rich = frame.n_seeing() > VIEWS_AT_ONCE;
         let clear = if is_rich { VIEWS_AT_ONCE } else { 2 };
         let mut births = Vec::new();
         for nth in 0..self.tracks.len() {
             let track = &self.tracks[nth];
-            // Two views of many often see nobody: rays of two different people can also meet.
+            // If only two of many views see a person, there is often nobody: rays to two different people can also meet.
             let (needed, clear) = if track.is_lasting() {
                 (2, 2)
             } else {
@@ -366,8 +367,7 @@ impl Tracker {
         births
     }
 
-    /// Returns the id of a new person: that of a missed or recognised person, or the next free one. Known bone lengths are
-    /// taken over.
+    /// Returns the id for a new track: that of a missed or recognised person, whose bone lengths are then reused, or the next free id.
     fn identity(&mut self, nth: usize, time_s: f64) -> u64 {
         if let Some(missed) = self.missed(&self.tracks[nth]) {
             let bones = self.tracks[missed].bones;
@@ -383,7 +383,7 @@ impl Tracker {
         })
     }
 
-    /// Returns the nearest missed person whose reach includes a new person.
+    /// Returns the nearest missed person who is close enough to be the new person.
     fn missed(&self, new: &Track) -> Option<usize> {
         let trunk = new.trunk()?;
         let each = self.tracks.iter().enumerate().filter_map(|(nth, track)| {

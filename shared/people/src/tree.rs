@@ -1,4 +1,4 @@
-//! Chooses one place for every joint by the support of the views and the lengths of the bones.
+//! Chooses one position for every joint, by the support from the views and by the lengths of the bones.
 
 use nalgebra::Point3;
 use skeleton::body::BONES;
@@ -22,13 +22,14 @@ const BRANCHES: [(usize, usize, Limb); N - 1] = [
     (5, 4, Limb::Bone(4)),
 ];
 const ROOT: usize = 12;
-/// Indices in `BONES` of the trunk and of the width of the hips.
+/// Index of the trunk in `BONES`; the next constant is the index of the width of the hips.
 const TRUNK: usize = 12;
 const HIP_WIDTH: usize = 2;
 
-/// Standard deviation of a bone's length that comes from the places of the joints, in metres, in addition to that of the length itself.
+/// Standard deviation of a bone's length, in metres, that comes from the candidate positions of its joints; it is added to the deviation of
+/// the length itself.
 const PLACE_SD_M: f64 = 0.04;
-/// Cost of a bone per half squared standard deviation, and the maximum of this cost.
+/// Cost of a bone for each half squared standard deviation; the next constant is the maximum of this cost.
 const BONE: f64 = 0.25;
 const MOST_OF_BONE: f64 = 1.0;
 
@@ -83,21 +84,21 @@ impl Expectations {
     }
 }
 
-/// A possible place of a joint and its worth.
+/// A candidate position of a joint, and its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Choice {
     pub(crate) place: Point3<f64>,
     pub(crate) worth: f64,
 }
 
-/// Chooses one place for every joint so that the total worth, minus the costs of the bones between the places, is maximal.
+/// Chooses one position for every joint so that the total score, minus the costs of the bones between the positions, is maximal.
 ///
-/// * Returns the index of each joint's choice; `None` if the best place of the joint costs more than it is worth.
+/// * Returns the index of each joint's choice; `None` if the best position of the joint costs more than its score.
 pub(crate) fn choose(
     choices: &[Vec<Choice>; N],
     expectations: &Expectations,
 ) -> [Option<usize>; N] {
-    // Worth of every choice including its subtree, and of leaving the joint out; the children of a joint are computed first.
+    // Score of every choice including its subtree, and of leaving the joint out; the children of a joint are computed first.
     let mut worths: [Vec<f64>; N] = core::array::from_fn(|joint| {
         let each = choices[joint].iter().map(|choice| choice.worth);
         each.chain([0.0]).collect()

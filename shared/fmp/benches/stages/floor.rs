@@ -1,4 +1,4 @@
-//! Lower limits of the time of every stage: only its arithmetic, at the peak rate of the machine.
+//! Lower limits of the time of every stage: the time of its arithmetic alone, at the peak rate of the machine.
 
 use fmp::{LevelLayout, N_CHANNELS, Springs};
 use kernels::{Isa, Peak};
@@ -16,7 +16,7 @@ pub(crate) struct Floors {
     pub(crate) peaks: Peaks,
 }
 
-/// Number of single-precision values that one thread computes per nanosecond.
+/// Number of single-precision operations that one thread performs per nanosecond.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Peaks {
     pub(crate) isa: &'static str,
@@ -46,7 +46,7 @@ impl Floors {
     }
 }
 
-/// Returns the number of single-precision values that one thread computes per millisecond.
+/// Returns the number of single-precision operations that one thread performs per millisecond.
 fn per_ms(quick: bool, run: impl Fn() -> u64) -> f64 {
     let clock = Clock::new(1, quick);
     let mut n = 0;
@@ -74,8 +74,8 @@ fn shrinking(workload: &Workload) -> f64 {
     workload.layout.levels.iter().enumerate().map(level).sum()
 }
 
-/// Returns the number of operations of the features. Each pixel takes the gradient in three planes, nine scalar products with comparisons
-/// in double precision, and four shares. Each cell takes 27 values under four norms.
+/// Returns the number of operations of the features. Each pixel needs the gradient in three planes, nine scalar products with comparisons
+/// in double precision, and four weighted contributions to cells. Each cell needs 27 values under four norms.
 fn describing(workload: &Workload) -> f64 {
     let per_pixel = 2.0 * (3.0 * 9.0 + 9.0 * 7.0 + 10.0) + 4.0 * 2.0;
     let cell = (workload.model.spec().cell_px as f64).powi(2);
@@ -84,8 +84,8 @@ fn describing(workload: &Workload) -> f64 {
     levels.map(|level| pixels(level) * (per_pixel + per_cell / cell)).sum()
 }
 
-/// Returns the number of multiply-adds of the filters in the cheapest known form: by definition, or by tiles with a side of some cells that
-/// are multiplied point by point (without the transforms).
+/// Returns the number of multiply-adds of the filters in the cheapest known form: either directly, or by tiles that are transformed and
+/// multiplied point by point (the transforms are not counted).
 ///
 /// * `tiles`: sides of the available tiles, in cells.
 fn products(workload: &Workload, tiles: &[usize]) -> f64 {
@@ -100,8 +100,8 @@ fn products(workload: &Workload, tiles: &[usize]) -> f64 {
     levels.map(|level| (level.rows * level.cols) as f64 * filters).sum()
 }
 
-/// Returns the number of candidates in both passes of every transform, within the window outside of which none can win, and in
-/// the choice among the child's types.
+/// Returns the number of candidates that must be compared. They are counted in both passes of every transform, within the window that
+/// contains every possible best candidate, and in the choice among the child's types.
 fn candidates(workload: &Workload, ranges: &Ranges) -> f64 {
     let window = |range: f64, quadratic: f64, side: usize| {
         (2.0 * (range / quadratic).sqrt() + 1.0).min(side as f64)

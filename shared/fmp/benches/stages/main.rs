@@ -1,5 +1,5 @@
-//! Benchmark of every stage of the single-view method on one frame. It prints times in milliseconds, compared with the peak rate of the
-//! machine, with the readable reference and with other programs.
+//! Benchmark of every stage of the single-view method on one frame. It prints times in milliseconds. They are compared with the limit from
+//! the machine's peak rate, with the readable reference implementation, and with other programs.
 //!
 //! Workloads: 172 x 224 pixels with 26 parts, 6 types each and filters of 5 x 5 cells (PARSE) or
 //! 6 x 6 (HumanEva), and 640 x 480 with 6 x 6. Real models and images are used if `../shared` exists beside

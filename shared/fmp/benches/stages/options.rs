@@ -10,7 +10,7 @@ pub(crate) struct Options {
     pub(crate) quick: bool,
     pub(crate) json: bool,
     pub(crate) record: bool,
-    /// The stages to measure; empty means all.
+    /// The stages to measure; if empty, all stages are measured.
     stages: Vec<String>,
     images: Vec<String>,
     isas: Vec<String>,
@@ -39,7 +39,7 @@ impl Options {
                     options.threads.push(n.map_err(|error| format!("--threads: {error}"))?);
                 }
                 "--commit" => options.commit = value()?,
-                // Cargo adds this option.
+                // Cargo passes this option.
                 "--bench" => {}
                 other => return Err(format!("unknown option {other}: see scripts/bench --help")),
             }
@@ -65,7 +65,8 @@ impl Options {
         self.images.is_empty() || self.images.iter().any(|image| image == name)
     }
 
-    /// Returns true if an instruction set is to be measured. The portable set is slow where it lacks multiply-add, so it must be requested.
+    /// Returns true if an instruction set is to be measured. The portable set is slow without multiply-add instructions, so it is only
+    /// measured if it is requested.
     pub(crate) fn wants_isa(&self, isa: Isa) -> bool {
         if self.isas.is_empty() {
             return self.quick || isa.name() != "portable" || Isa::available().len() == 1;

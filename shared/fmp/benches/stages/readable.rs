@@ -1,4 +1,4 @@
-//! Time of the readable reference on one thread, and the score ranges of the parts.
+//! Time of the readable reference implementation on one thread, and the score ranges of the parts.
 
 use std::hint::black_box;
 
@@ -8,7 +8,7 @@ use crate::clock::Clock;
 use crate::stages::StageTimes;
 use crate::workload::Workload;
 
-/// Milliseconds of the reference, and the score ranges that the lower limits need.
+/// Time of the reference implementation in milliseconds, and the score ranges from which the lower limits are computed.
 pub(crate) struct Readable {
     pub(crate) ms: StageTimes,
     pub(crate) ranges: Ranges,
@@ -19,8 +19,8 @@ pub(crate) struct Readable {
 pub(crate) type Ranges = Vec<Vec<f64>>;
 
 impl Readable {
-    /// Runs the reference once. Filters and messages run on one level, the first of the second octave, and their times are
-    /// scaled by its share of the cells.
+    /// Runs the reference implementation once. Filters and messages run on one level, the first of the second octave; their times are
+    /// extrapolated from the fraction of all cells on that level.
     pub(crate) fn measure(workload: &Workload) -> Self {
         let Workload { model, layout, .. } = workload;
         let clock = Clock::new(1, true);

@@ -16,7 +16,7 @@ use crate::workload::{OtherView, Workload};
 pub(crate) struct Times {
     pub(crate) min: f64,
     pub(crate) median: f64,
-    /// Smallest processor time of all threads together.
+    /// Shortest processor time, summed over all threads.
     pub(crate) cpu: f64,
 }
 
@@ -30,7 +30,7 @@ impl Times {
     }
 }
 
-/// Milliseconds on one thread of the elementary stages.
+/// Times of the elementary stages on one thread, in milliseconds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StageTimes {
     pub(crate) shrink: f64,
@@ -95,7 +95,7 @@ struct Arena {
     hog: HogWorkspace,
 }
 
-/// One workload on one instruction set with a number of threads.
+/// One workload on one instruction set with a given number of threads.
 pub(crate) struct Bench<'a> {
     workload: &'a Workload,
     isa: Isa,

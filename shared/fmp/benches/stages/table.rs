@@ -13,7 +13,7 @@ use crate::readable::Readable;
 use crate::stages::{Stage, Times};
 use crate::workload::Workload;
 
-/// Times per frame of other programs with the HumanEva model on two threads: (image, program, milliseconds).
+/// Times per frame of other programs with the HumanEva model on two threads: image, program, and time in milliseconds.
 const PEERS: [(&str, &str, f64); 3] = [
     ("172x224", "authors", 1120.0),
     ("172x224", "PartsBasedDetector", 389.0),
@@ -72,7 +72,7 @@ impl Row {
 
     pub(crate) fn compared(self, floors: &Floors, readable: &Readable) -> Self {
         let floor_ms = floors.ms.of(self.kind).map(|value| value / self.threads as f64);
-        // The reference does not support terms of other views.
+        // The reference implementation does not support terms of other views.
         let readable = readable.ms.of(self.kind);
         let readable = readable.filter(|_| self.min_ms > 0.0 && self.kind != Stage::Iteration);
         Self {
@@ -146,7 +146,7 @@ impl Table {
         )
     }
 
-    /// Returns the peak rates from which the floors were computed.
+    /// Returns the text below the table: the peak rates from which the lower limits were computed.
     pub(crate) fn foot(&self) -> String {
         let peak = |peaks: &Peaks| {
             let Peaks {

@@ -128,7 +128,7 @@ fn made_up_pixels([width, height]: [usize; 2]) -> Vec<u8> {
     (0..3 * width * height).map(&mut pixel).collect()
 }
 
-/// Contribution of another view: one map for all parts, and a preferred type.
+/// Terms of another view: one map for all parts, and a preferred type.
 pub(crate) struct OtherView {
     /// Maps of the levels.
     maps: Vec<Vec<f32>>,

@@ -25,7 +25,7 @@ pub enum MatError {
         /// The expected type.
         expected: &'static str,
     },
-    /// The size of an array does not match the rest of the model.
+    /// The size of an array contradicts the rest of the model.
     #[error("`{field}` is {}, expected {}", times(.got), times(.expected))]
     Size {
         /// Path of the field in the file.
@@ -52,9 +52,9 @@ pub enum MatError {
 
 /// Reads a model of Yang & Ramanan's release 1.3 or 1.4.
 ///
-/// The releases differ in `defid`. Release 1.3 has one spring per type of the child. Release 1.4 has one per pair of types, `[parent type,
-/// child type]`, with 0 if the pair never occurs (its `biasid` may also contain 0). Parents are `components{1}(i).parent`; the model's own
-/// `pa` or `parent`, if present, must agree. `len` and `obj` are ignored. Only models with one component can be read.
+/// The releases differ in `defid`. Release 1.3 has one spring per type of the child. Release 1.4 has one spring per pair of types, `[parent
+/// type, child type]`, with 0 if the pair never occurs (its `biasid` may also contain 0). Parents are `components{1}(i).parent`; the
+/// model's own `pa` or `parent`, if present, must agree. `len` and `obj` are ignored. Only models with one component can be read.
 ///
 /// # Errors
 ///

@@ -5,7 +5,7 @@
 //! | 0..8 | `PLXMODEL` |
 //! | 8..12 | version, u32, little-endian: 1 |
 //! | 12..20 | length of the payload, u64, little-endian |
-//! | 20..28 | FNV-1a (64 bit) of the payload, little-endian; it detects every change within one byte |
+//! | 20..28 | FNV-1a checksum (64 bit) of the payload, little-endian; it detects every change that affects a single byte |
 //! | 28.. | payload: bincode 2, standard configuration (little-endian, variable-length integers) |
 
 use formats::checksum::{Envelope, EnvelopeError};
@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn a_count_that_the_payload_cannot_hold_is_refused() {
-        // An empty name, then 2^62 parts.
+        // An empty name, followed by a list of 2^62 parts.
         let mut payload = vec![0, 253];
         payload.extend((1_u64 << 62).to_le_bytes());
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The payload of Parallax's own model file; all uses of serde and bincode are here.
+//! The payload of Parallax's own model file; serde and bincode are used only here.
 
 use bincode::config::{self, Configuration, Limit, LittleEndian, Varint};
 use bincode::error::{DecodeError, EncodeError};

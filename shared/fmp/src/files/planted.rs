@@ -26,7 +26,7 @@ pub(crate) fn three_parts() -> ModelSpec {
     }
 }
 
-/// Returns the same tree with springs per pair of types, as in release 1.4; one pair never occurs.
+/// Returns the same tree with a spring for each pair of types, as in release 1.4; one pair never occurs.
 pub(crate) fn per_pair() -> ModelSpec {
     let mut spec = three_parts();
     for (part_idx, part) in spec.parts.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Common basis of the released models' formats, which refer to everything by 1-based indices.
+//! Common code for the formats of the released models, which refer to everything by 1-based indices.
 
 use skeleton::{MIRROR, N_PARTS, PARENT, PART_NAMES};
 
@@ -19,7 +19,7 @@ pub(super) struct Released {
     pub(super) interval: usize,
     /// Side of a cell, in pixels.
     pub(super) cell_px: usize,
-    /// Minimum score requested by training.
+    /// Minimum score of the positive examples, as set by training.
     pub(super) threshold: f64,
 }
 
@@ -46,7 +46,7 @@ pub(super) enum SpringIds {
 }
 
 impl Released {
-    /// Replaces every index by the item it refers to.
+    /// Replaces every index with the item that it refers to.
     ///
     /// A tree of 26 parts with the published models' parents gets their part names and their mirror
     /// permutation; any other tree gets `part 1`, `part 2`, ... and no mirror.

@@ -2,7 +2,7 @@
 
 use crate::{Model, Spring, Springs};
 
-/// Structure of a model, without its weights.
+/// The structure of a model, without its weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelSummary {
     /// Description of the model's origin.
@@ -15,17 +15,17 @@ pub struct ModelSummary {
     pub filter_sizes: Vec<[usize; 2]>,
     /// Number of pairs of types that have a bias.
     pub n_biases: usize,
-    /// Minimum and maximum bias of a pair of types; `None` if there is none.
+    /// Minimum and maximum bias of a pair of types; `None` if no pair has a bias.
     pub bias_range: Option<[f64; 2]>,
     /// Number of springs.
     pub n_springs: usize,
-    /// True if there is one spring per pair of types, false if per type of the child.
+    /// True if there is one spring for each pair of types, false if there is one for each type of the child.
     pub springs_per_pair: bool,
-    /// Ranges of the springs; `None` if there is none.
+    /// Ranges of the springs; `None` if there are no springs.
     pub springs: Option<SpringRanges>,
     /// Score of every root placement.
     pub root_bias: f64,
-    /// Minimum score of the positives in training.
+    /// Minimum score of the positive examples in training.
     pub threshold: f64,
     /// Minimum score reported by detection.
     pub detection_threshold: f64,
@@ -33,7 +33,7 @@ pub struct ModelSummary {
     pub interval: usize,
     /// Side of a feature cell, in pixels.
     pub cell_px: usize,
-    /// True if the model contains the mirror image of every part.
+    /// True if it is known which part is the mirror image of which.
     pub has_mirror: bool,
 }
 

@@ -3,7 +3,7 @@
 use super::{Edge, Filter, Model, ModelError, ModelSpec, PartSpec, Spring, Springs};
 use crate::N_CHANNELS;
 
-/// Checks all assumptions of the rest of the crate.
+/// Checks all properties of a model that the rest of the crate relies on.
 pub(super) fn check(spec: &ModelSpec) -> Result<(), ModelError> {
     if spec.parts.is_empty() {
         return Err(ModelError::NoParts);
@@ -37,9 +37,9 @@ pub(super) fn check(spec: &ModelSpec) -> Result<(), ModelError> {
 }
 
 const MAX_FILTERS: usize = Model::MAX_PARTS * Model::MAX_TYPES;
-/// Larger numbers could overflow single precision when many are summed.
+/// Maximum number in a model; sums of larger numbers could overflow in single precision.
 const MAX_NUMBER: f64 = 1e9;
-/// Weaker springs could overflow the intersections of parabolas.
+/// Minimum stiffness of a spring; with weaker springs, the intersections of parabolas could overflow.
 const MIN_STIFFNESS: f64 = 1e-9;
 const MAX_ANCHOR: i32 = 1000;
 
@@ -482,7 +482,7 @@ mod tests {
             "part 1 mirrors part 3, but part 3 does not mirror it, or the tree differs"
         );
         assert_eq!(outcome(|model| model.mirror = Some(vec![0, 1, 2])), "fine");
-        // Three arms in a ring: the tree is preserved, but parts are not exchanged in pairs.
+        // Three arms in a cycle: the tree is preserved, but parts are not swapped in pairs.
         let ring = outcome(|model| {
             model.parts.push(model.parts[2].clone());
             model.mirror = Some(vec![0, 2, 3, 1]);

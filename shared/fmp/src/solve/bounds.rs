@@ -22,7 +22,7 @@ impl Bound {
 }
 
 impl Solver {
-    /// Computes the bounds of the offered levels with one solution without extra terms.
+    /// Computes the bounds of the levels that have responses, with one solution without extra terms.
     ///
     /// # Panics
     ///

@@ -3,8 +3,7 @@
 use super::{Root, Solver};
 use crate::{Bound, Bounds, Pose, Responses};
 
-/// Number of roots that are backtracked together at the first request for a level; doubled each
-/// time.
+/// Number of roots that are backtracked together at the first request for a level; it is doubled at each further request.
 const BATCH: usize = 16;
 
 impl Solver {
@@ -89,7 +88,7 @@ impl Solver {
     }
 }
 
-/// Returns the roots with no better neighbour among the eight around them, and no equal neighbour before them.
+/// Returns the roots that are local maxima: none of the eight neighbours is better, and none before it in the order is equal.
 fn peaks(roots: &[Root]) -> Vec<Root> {
     let Some(last) = roots.last() else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! Solves the same evidence repeatedly, under terms that change little.
+//! Solves the same evidence repeatedly, under terms that change little from time to time.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,14 +16,13 @@ const MAX_KEPT_BYTES: usize = 64 << 20;
 
 /// Incremental solver: solves one view's evidence repeatedly, as the other views' terms change.
 ///
-/// The results are bit-identical to those of [`Solver::best`], with less work. Levels that cannot
-/// contain the best pose are skipped ([`Bounds`], [`ExtraTerms::max_gain`]). On the other levels, a term is
-/// limited to the value at which it already rules a pose out, which keeps the windows of the
-/// transforms small. Finally, the scores of subtrees are kept if their terms have not changed since the
-/// last solution ([`ExtraTerms::key`]).
+/// The results are bit-identical to those of [`Solver::best`], with less work. Levels that cannot contain the best pose are skipped
+/// ([`Bounds`], [`ExtraTerms::max_gain`]). On the other levels, a term is not reduced below the value that already rules a pose out, which
+/// keeps the windows of the transforms small. Finally, the scores of subtrees are reused if their terms have not changed since the last
+/// solution ([`ExtraTerms::key`]).
 ///
-/// The solver keeps up to 64 MiB of score planes, those of the most promising levels. It returns them to the
-/// [`Solver`] when it is dropped.
+/// The solver keeps up to 64 MiB of score planes, those of the most promising levels. When it is dropped, it returns the planes to the
+/// [`Solver`].
 #[derive(Debug)]
 pub struct IncrementalSolver<'a> {
     solver: &'a Solver,
@@ -35,7 +34,7 @@ pub struct IncrementalSolver<'a> {
     keep: Vec<bool>,
     /// The levels to solve with their upper bounds, best first.
     order: Vec<(Upper, u16)>,
-    /// Score of the best guess.
+    /// Score of the best initial guess.
     lowest: f32,
 }
 
@@ -61,13 +60,12 @@ impl Solver {
 }
 
 impl IncrementalSolver<'_> {
-    /// Returns the best pose over the offered levels; see [`Solver::best`].
+    /// Returns the best pose over the levels that have responses; see [`Solver::best`].
     ///
-    /// Without [`Responses::with_bounds`], the first call computes the bounds.
+    /// If the responses have no bounds ([`Responses::with_bounds`]), the first call computes them.
     ///
-    /// * `guesses`: poses that may be nearly as good as the best, such as the last result. They
-    ///   only save work: levels that cannot reach the best guess are skipped, and its level is
-    ///   solved first.
+    /// * `guesses`: poses that may be nearly as good as the best, such as the last result. They only save work: the level of the best guess
+    ///   is solved first, and levels that cannot reach its score are skipped.
     #[expect(
         single_use_lifetimes,
         reason = "anonymous lifetimes in `impl Trait` are unstable"

@@ -1,4 +1,4 @@
-//! Counters of the incremental solver, which show its share of the full work.
+//! Counters that show how much of the full work the incremental solver does.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -10,15 +10,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct SolveStatistics {
     /// Number of solutions.
     pub solutions: u64,
-    /// Number of offered levels.
+    /// Number of levels with responses.
     pub levels_offered: u64,
     /// Number of levels that bounds could not rule out.
     pub levels_solved: u64,
-    /// Number of message entries on all offered levels.
+    /// Number of message entries on all levels with responses.
     pub entries_offered: u64,
     /// Number of message entries on the levels that bounds could not rule out.
     pub entries_solved: u64,
-    /// Number of message entries that were computed because they could not be kept from the previous solution.
+    /// Number of message entries that were computed because they could not be reused from the previous solution.
     pub entries_computed: u64,
 }
 

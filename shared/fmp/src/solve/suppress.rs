@@ -9,11 +9,10 @@ const MOST: usize = 1000;
 impl Solver {
     /// Returns every pose whose root scores at least the threshold, except those that overlap a better pose.
     ///
-    /// This is the reference programs' rule: of the 1000 best candidates, a candidate is dropped if it overlaps a picked one by more than
-    /// `overlap`. The overlap of two candidates is the largest share of a box of the picked candidate that the corresponding box of the
-    /// other candidate covers. It is taken over all parts and the rectangle around all parts. The result is sorted best first; ties are
-    /// resolved as in
-    /// [`Self::best`].
+    /// The rule is that of the reference programs: the 1000 best candidates are considered, best first, and a candidate is dropped if it
+    /// overlaps a selected one by more than `overlap`. To compute the overlap, each box of the selected candidate is compared with the same
+    /// box of the other candidate; the boxes are those of all parts, and the rectangle around them. The overlap is the largest fraction of
+    /// such a box that is covered. The result is sorted best first; ties are resolved as in [`Self::best`].
     ///
     /// # Panics
     ///
@@ -23,7 +22,7 @@ impl Solver {
         suppress(&self.model, evidence.layout(), poses, settings)
     }
 
-    /// Returns the poses whose root scores at least `threshold`, but at most the `max` best, sorted best first; ties are resolved as in
+    /// Returns the poses whose root scores at least `threshold`, or only the best `max` of them, sorted best first; ties are resolved as in
     /// [`Self::best`]. Most of these poses are neighbours of other poses: see [`Self::candidates`].
     ///
     /// # Panics
@@ -56,7 +55,7 @@ impl Solver {
 }
 
 impl Root {
-    /// Highest score first, then lowest level, then row-major order.
+    /// Orders by highest score first, then lowest level, then row-major order.
     pub fn best_first(&self, other: &Self) -> std::cmp::Ordering {
         let place = |root: &Self| (root.level, root.y, root.x);
         other.score.total_cmp(&self.score).then_with(|| place(self).cmp(&place(other)))
@@ -92,7 +91,7 @@ fn boxes(model: &Model, layout: &Layout, pose: &Pose) -> Boxes {
     all
 }
 
-/// Returns the largest share of a picked box that the other box covers.
+/// Returns the largest fraction of a selected candidate's box that the other candidate's box covers.
 fn overlap(picked: &Boxes, other: &Boxes) -> f64 {
     let share = |(a, b): (&[f64; 4], &[f64; 4])| {
         let side = |low: f64, high: f64| (high - low + 1.0).max(0.0);

@@ -1,4 +1,4 @@
-//! All max-sum messages on one level, from the leaves to the root, and the backtracking.
+//! Computes all max-sum messages on one level, from the leaves to the root, and backtracks the best tree.
 
 use std::sync::atomic::Ordering;
 
@@ -10,8 +10,7 @@ use crate::{Placement, Pose, Responses, Window};
 /// Score planes of one level, reused from level to level.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    /// One plane per part and type, part by part, with the messages of the children added, and the
-    /// margin after the last one.
+    /// One plane for each part and type, part by part, with the messages of the children added; a margin follows the last plane.
     planes: ScoreBuffer,
     /// Score ranges of the planes.
     ranges: Vec<ScoreRange>,
@@ -21,11 +20,11 @@ pub(super) struct Workspace {
     slack: f64,
     /// The keys of every part's terms.
     keys: Vec<Option<u64>>,
-    /// True for a part whose planes can be kept because all terms of its subtree are unchanged.
+    /// True for a part whose planes can be reused because all terms of its subtree are unchanged.
     stays: Vec<bool>,
     /// True for a part whose own score has been written.
     begun: Vec<bool>,
-    /// Sum of the largest own scores of all parts.
+    /// Sum, over all parts, of the part's largest own score.
     own: f64,
     /// Number of message entries that the last sweep computed.
     n_computed: usize,
@@ -87,12 +86,11 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Limits the problem to poses that lose less than `slack` against the bound of the
-    /// level; other poses may get a score that is too low.
+    /// Limits the problem to poses whose score is below the bound of the level by less than `slack`; other poses may get a score that is
+    /// too low.
     ///
-    /// Terms can then be raised to a floor: a pose with one term that loses more than `slack` is
-    /// still ruled out if that term loses just `slack`. Smaller differences of scores
-    /// make the windows of the transforms smaller.
+    /// Terms can then be raised to a minimum: a pose that loses more than `slack` by one term is still ruled out if the term is raised so
+    /// that it loses exactly `slack`. This makes the differences between scores smaller, and with them the windows of the transforms.
     pub(super) fn with_slack(self, slack: f64) -> Self {
         Self { slack, ..self }
     }
@@ -134,8 +132,7 @@ impl<'a> Problem<'a> {
         has_one.then_some(term[0])
     }
 
-    /// Returns the minimum position term of a part in a pose that loses less than `slack`, if some terms
-    /// are lower.
+    /// Returns the minimum position term that a part can have in a pose that loses less than `slack`; `None` if no term is lower.
     fn worst_term(&self, part: usize, slack: f64) -> Option<f32> {
         let extra = self.extra?;
         let types = 0..self.solver.model.n_types(part);
@@ -220,7 +217,7 @@ impl<'a> Sweep<'a> {
         most.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Returns the sum of the largest own scores of all parts, if all are new.
+    /// Returns the sum, over all parts, of the part's largest own score, if all scores are new.
     pub(super) fn own(&self) -> f64 {
         self.workspace.own
     }

@@ -1,4 +1,4 @@
-//! Allocations of the extractor, on one thread and in a pool.
+//! Counts the allocations of the extractor, on one thread and in a pool.
 
 use std::sync::Arc;
 
@@ -61,7 +61,8 @@ fn of_frames(n_frames: usize) -> usize {
 /// Checks the extractor on one thread and in a pool.
 pub(crate) fn takes_no_memory() {
     assert_eq!(of_frames(3), 0, "on one thread");
-    // The pool lives until the end: a thread that ends allocates memory for the data it leaves to others, which would be counted.
+    // The pool lives until the end, because a thread that ends allocates memory for the data that it leaves to other threads; this would
+    // be counted.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3);
     let pool = pool.build().unwrap();
     assert_eq!(pool.install(|| of_frames(3)), 0, "in a pool");

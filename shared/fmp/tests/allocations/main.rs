@@ -1,4 +1,4 @@
-//! From the second frame on, only the results allocate memory, on any thread.
+//! Checks that from the second frame on, only the results allocate memory, on any thread.
 //!
 //! This test runs without the test harness, because the harness's own thread allocates memory. The counter covers all threads, because the
 //! threads of a pool do most of the work.
@@ -24,7 +24,7 @@ fn allocations(call: impl FnOnce()) -> usize {
     change.allocations + change.reallocations
 }
 
-/// Frames after the first allocate memory for their results only.
+/// Checks that frames after the first allocate memory for their results only.
 fn main() {
     let mut some = Vec::new();
     let counted = allocations(|| some = std::hint::black_box(vec![1_u8; 100]));
@@ -34,6 +34,6 @@ fn main() {
     assert!(allocations(elsewhere) > 0, "and on all threads");
     solve::takes_memory_for_the_answer_only();
     solve::takes_memory_for_the_answer_only_again();
-    // This check runs last, since threads of a pool may still be ending after the pool is gone.
+    // This check runs last, because the threads of its pool may still be ending after the pool has been dropped.
     extract::takes_no_memory();
 }

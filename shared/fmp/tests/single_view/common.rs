@@ -20,7 +20,7 @@ impl Noise {
         (self.next() % n as u64) as usize
     }
 
-    /// One of 65 values in -1..=1, so that ties happen.
+    /// Returns one of 65 values in -1..=1, so that ties occur.
     pub(crate) fn score(&mut self) -> f64 {
         (self.below(65) as f64 - 32.0) / 32.0
     }

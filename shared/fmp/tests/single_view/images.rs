@@ -14,7 +14,7 @@ use crate::common::Noise;
 fn picture([width, height]: [usize; 2], [x0, y0]: [usize; 2]) -> Vec<u8> {
     let mut noise = Noise(7);
     let mut data = vec![128; width * height * 3];
-    // Blotches of 6 x 6 pixels, so that the texture survives resizing.
+    // Blotches of 6 x 6 pixels, which survive resizing.
     let blotches: Vec<u8> = (0..3 * 8 * 11).map(|_| noise.below(256) as u8).collect();
     for y in 0..64 {
         for x in 0..48 {
@@ -186,8 +186,8 @@ fn extractor_and_solver_give_the_result_of_the_reference() {
         (best.level, &best.parts)
     );
     assert!((f64::from(found.pose.score) - best.score).abs() < 1e-4);
-    // Plain sums are as accurate as single precision allows. Tiles round more, in proportion to the largest responses: 1.3e-5 of the
-    // largest response was measured here.
+    // Plain sums are as accurate as single precision allows. Tiles have larger rounding errors, in proportion to the largest responses:
+    // errors of up to 1.3e-5 of the largest response were measured here.
     let mut plain = vec![f32::NAN; found.layout.n_responses()];
     Extractor::direct(Arc::clone(&model)).responses(image, &found.layout, &mut plain);
     let largest = plain.iter().fold(0.0_f32, |largest, it| largest.max(it.abs()));

@@ -1,4 +1,4 @@
-//! The incremental solver: every shortcut compared with the full solution.
+//! Compares every shortcut of the incremental solver with the full solution.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ fn times(n_parts: usize) -> impl Strategy<Value = Vec<(OtherViews, Guess)>> {
 enum Guess {
     None,
     Last,
-    /// A pose on a level that is not offered.
+    /// A pose on a level without responses.
     Elsewhere,
 }
 
@@ -61,7 +61,7 @@ proptest! {
         let mut evidence = Evidence::new(&mut noise, &model, &SIZES);
         evidence.values.iter_mut().for_each(|value| *value += offset);
         evidence.levels.truncate(n_levels);
-        // Every level is a little worse than the one before it, so some levels can be skipped.
+        // Every level scores a little lower than the one before it, so that some levels can be skipped.
         for level in 0..SIZES.len() {
             let maps = evidence.layout.map_range(level, 0).start..evidence.layout.n_responses();
             evidence.values[maps].iter_mut().for_each(|value| *value -= 0.25);
@@ -137,7 +137,7 @@ impl ExtraTerms for OnOnePart {
 }
 
 proptest! {
-    /// The bounds were received from another process, and may be wrong.
+    /// The bounds come from another process, and may be wrong.
     #[test]
     fn wrong_bounds_do_not_panic(
         seed in any::<u64>(),
@@ -183,7 +183,7 @@ impl ExtraTerms for Everywhere {
     }
 }
 
-/// Solves the evidence with all terms in turn, with and without shortcuts.
+/// Solves the evidence with each set of terms in turn, with and without shortcuts.
 fn check(solver: &Solver, evidence: &Evidence, given: bool, times: &[(OtherViews, Guess)]) {
     let view = evidence.view();
     let bounds = solver.bounds(&view);

@@ -27,15 +27,15 @@ impl ExtraTerms for OtherView {
     }
 }
 
-/// Terms that differ from part to part and from time to time: one seed for every part.
+/// Terms that differ from part to part and from time to time; one seed for each part.
 #[derive(Debug)]
 pub(crate) struct OtherViews {
     pub(crate) seeds: Vec<u64>,
-    /// Value added to every position term; no term exceeds it.
+    /// Value that is added to every position term, and that no term exceeds.
     pub(crate) gain: f32,
     /// Factor by which all terms are multiplied.
     pub(crate) scale: f32,
-    /// True if the gain is reported.
+    /// True if the maximum gain is reported.
     pub(crate) known: bool,
 }
 

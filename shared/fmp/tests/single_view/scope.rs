@@ -1,4 +1,4 @@
-//! Searching a part of the pyramid gives the same results there as searching the whole pyramid.
+//! Checks that a search of a part of the pyramid gives the same results there as a search of the whole pyramid.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ fn model(noise: &mut Noise, cell_px: usize, interval: usize) -> Arc<Model> {
     Arc::new(Model::new(spec).unwrap())
 }
 
-/// Returns a range of at least one of `n` items, from two shares.
+/// Returns a range of at least one of `n` items, from two fractions.
 fn cut(n: usize, shares: [f64; 2]) -> Range<usize> {
     let at = shares.map(|share| (share * n as f64) as usize);
     at[0].min(at[1])..at[0].max(at[1]) + 1
@@ -51,7 +51,7 @@ fn shares() -> impl Strategy<Value = Shares> {
     [two(), two(), two()]
 }
 
-/// Returns a scope from shares of the levels, the columns and the rows.
+/// Returns a scope from fractions of the levels, the columns and the rows.
 fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     let levels = cut(layout.levels.len(), levels);
     let [x, y] = [(x, 0), (y, 1)].map(|(shares, axis)| {
@@ -66,7 +66,7 @@ fn scope(layout: &Layout, [levels, x, y]: Shares) -> Scope {
     .unwrap()
 }
 
-/// Returns the responses of a scope, and those of the whole image on the same cells.
+/// Returns the responses of a scope, and the responses of the whole image on the same cells.
 fn both(
     extractor: &Extractor,
     (image, layout): (Rgb8View<'_>, &Layout),
@@ -92,8 +92,8 @@ fn both(
 
 /// Returns the maximum difference between the response of the scope and that of the whole image, for every response.
 ///
-/// It is the bound of [`FilterBank::correlate`] for both, with the largest possible feature values. An orientation feature is half of the
-/// sum of four clipped entries, a texture feature is a weighted sum of eighteen, and the padding feature is 1.
+/// It is the sum of the bounds of [`FilterBank::correlate`] for the two, with the largest possible feature values. An orientation feature
+/// is half of the sum of four clipped entries, a texture feature is a weighted sum of eighteen, and the padding feature is 1.
 fn bounds(model: &Model, layout: &Layout, scope: &Scope) -> Vec<f64> {
     let filters = &model.spec().filters;
     let templates: Vec<_> = filters
@@ -145,7 +145,7 @@ proptest! {
         let scope = scope(&layout, shares);
         let [got, want] = both(&Extractor::direct(Arc::clone(&model)), (image, &layout), &scope);
         prop_assert!(got == want, "{:?}", scope);
-        // Tiles begin elsewhere, so they round differently.
+        // Tiles begin at other cells, so they round differently.
         let [got, want] = both(&Extractor::new(Arc::clone(&model)), (image, &layout), &scope);
         let bounds = bounds(&model, &layout, &scope);
         for ((got, want), bound) in got.iter().zip(&want).zip(bounds) {

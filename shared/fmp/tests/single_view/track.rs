@@ -1,4 +1,4 @@
-//! Tests of where the next frame is searched.
+//! Tests which part of the next frame is searched.
 
 use fmp::{FrameTime, Layout, Model, Placement, Pose, Scope, TrackSettings, Tracker};
 
@@ -47,7 +47,7 @@ impl Scene {
         scope == whole
     }
 
-    /// Returns which of ten frames, at a given frame rate, are searched in full if all scores equal the first.
+    /// Returns which of ten frames, at a given frame rate, are searched in full if all scores equal the first score.
     fn full_at(rate_hz: f64) -> Vec<u64> {
         let mut scene = Self::new(Some(TrackSettings {
             full_every: 1000,
@@ -93,7 +93,7 @@ fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
     assert_eq!(full, [true, false, true, true, false]);
 }
 
-/// At one frame per second, the person can be elsewhere in the next frame.
+/// At one frame per second, the person can be anywhere in the next frame.
 #[test]
 fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
     assert_eq!(Scene::full_at(1.0), (0..10).collect::<Vec<_>>());
@@ -146,7 +146,7 @@ fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
 #[test]
 fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
-    // A gradual drop counts as well; the result of the full search is the new reference.
+    // A gradual drop of the score causes a full search as well; its result is the new reference.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];
     let full: Vec<bool> = (0..)
         .zip(scores)

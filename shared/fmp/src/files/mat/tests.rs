@@ -28,7 +28,7 @@ fn outcome(spec: &ModelSpec, field: &str, change: impl FnOnce(&mut Mat)) -> Stri
     }
 }
 
-/// Returns a field of a part: 0 `biasid`, 1 `filterid`, 2 `defid`, 3 `parent`.
+/// Returns a field of a part, by its index: 0 `biasid`, 1 `filterid`, 2 `defid`, 3 `parent`.
 fn of_part(components: &mut Mat, part: usize, field: usize) -> &mut Mat {
     match components {
         Mat::Cell(cells) => match &mut cells[0] {

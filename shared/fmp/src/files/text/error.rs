@@ -52,7 +52,7 @@ pub enum TextError {
         /// Text found in the file.
         got: String,
     },
-    /// Two places of the file contradict each other.
+    /// Two fields of the file contradict each other.
     #[error("{place}: `{field}` says {what} = {got}, expected {expected}")]
     Disagrees {
         /// The field that was being read.
@@ -80,7 +80,7 @@ pub enum TextError {
         /// Maximum accepted value.
         max: usize,
     },
-    /// A part is anchored at a different level from its parent.
+    /// The anchor of a part is on another level than its parent.
     #[error(
         "{place}: `defs_anchor` puts spring {spring} at {got} octaves from its parent, expected 0"
     )]
