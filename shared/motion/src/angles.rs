@@ -16,9 +16,9 @@ use crate::track::{Estimate, State};
 pub use define::Angle;
 use spread::Place;
 
-/// Sine of the smallest bend of a knee or elbow that determines its bending axis: 20 degrees.
+/// Sine of the smallest bend (20 degrees) of a knee or elbow from which the axis of its bending is computed.
 const LEAST_BEND: f64 = 0.342;
-/// Sine of the smallest angle between a limb and an axis at which the limb's direction about the axis is determined: 10 degrees.
+/// Sine of the smallest angle (10 degrees) between a limb and an axis at which the limb's direction about that axis can be computed.
 const LEAST_TILT: f64 = 0.1736;
 /// Maximum standard deviation of a reported angle, in degrees.
 pub const MOST_SD_DEGREES: f64 = 45.0;
@@ -28,7 +28,7 @@ pub const MOST_SD_DEGREES: f64 = 45.0;
 pub enum Unknown {
     /// A joint of the angle has no position.
     Missing,
-    /// The angle is not defined for these positions, such as the rotation of a straight arm.
+    /// The angle is not defined for these positions; for example, the rotation of a straight arm is not.
     Undefined,
     /// The standard deviation of the angle is above [`MOST_SD_DEGREES`].
     Uncertain,
@@ -58,9 +58,9 @@ pub struct Value {
 
 /// Computes all angles of one instant.
 ///
-/// * `joints`: the joints with their roles; if a role occurs several times, the first joint counts.
-/// * `up`: direction against gravity in the world, if known; without it, angles with the vertical are missing.
-/// * Returns every angle of `Angle`, in the order of that type.
+/// * `joints`: the joints with their roles; if several joints have the same role, the first one is used.
+/// * `up`: direction against gravity in the world, if known; without it, angles that are measured from the vertical are missing.
+/// * Returns all angles of the type `Angle`, in the order of its variants.
 pub fn angles(
     joints: &[(Role, Estimate)],
     up: Option<UnitVector3<f64>>,

@@ -8,18 +8,18 @@ use crate::track::{Estimate, Smoothed, State};
 
 /// Number of steps of the projection; it converges quadratically if the start is a few centimetres off.
 const N_STEPS: usize = 6;
-/// Maximum deviation of a bone's length, as a share of the length; a bone beyond it is wrong and stays unchanged.
+/// Maximum deviation of a bone's length, as a fraction of the length; a bone that deviates more is taken as wrong and is not corrected.
 const MOST_OFF: f64 = 0.5;
-/// Standard deviation assumed for a position without a covariance, in metres.
+/// Standard deviation that is assumed for a position without a covariance, in metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Minimum number of frames for a length.
+/// Minimum number of frames from which a bone length is computed.
 const LEAST_FRAMES: usize = 10;
 
-/// Moves joints so that each limb bone has its median length, by the smallest displacement in terms of the covariances.
+/// Moves joints so that each limb bone has its median length. The displacement is the smallest one, measured by the covariances.
 ///
-/// At every instant, the most likely joints on the constraint are found by Gauss-Newton steps. With the covariances `P` and
-/// the derivatives `J` of the lengths, `x -= P J' (J P J')^-1 (lengths - constant)`, and `P` is reduced by the information in the lengths.
-/// The lengths are constant over the run and the input is smooth, so the result is smooth as well.
+/// At every instant, the most likely joints that satisfy this constraint are found by Gauss-Newton steps. With the covariances `P` and the
+/// derivatives `J` of the lengths, `x -= P J' (J P J')^-1 (lengths - constant)`, and `P` is reduced by the information in the lengths. The
+/// lengths are constant over the run and the input is smooth, so the result is smooth as well.
 ///
 /// * Returns the bones and their lengths.
 pub(crate) fn constant(
@@ -47,11 +47,11 @@ pub(crate) fn constant(
     for at in 0..recorded.times.len() {
         project(tracks, at, &bones);
     }
-    // Twins of a joint (HumanEva names some joints twice) stay where the first one is.
+    // HumanEva names some joints twice; the second joint of such a pair is placed where the first one is.
     bones
 }
 
-/// Projects the joints at one instant.
+/// Moves the joints at one instant to the required bone lengths.
 fn project(tracks: &mut [Vec<Smoothed>], at: usize, bones: &[([usize; 2], f64)]) {
     let here: Vec<([usize; 2], f64)> = bones
         .iter()

@@ -1,4 +1,4 @@
-//! The low-pass filter of gait laboratories: Butterworth, forwards and backwards, without delay.
+//! The low-pass filter used in gait laboratories: a Butterworth filter, run forwards and backwards, so that there is no delay.
 
 use core::f64::consts::PI;
 
@@ -7,36 +7,38 @@ use nalgebra::Vector3;
 use crate::recorded::{Counts, Motion, Recorded, Report, median};
 use crate::track::{Absent, Estimate, Smoothed, State};
 
-/// Usual cutoff for gait, in Hz.
+/// Usual cutoff frequency for gait, in Hz.
 pub const CUTOFF_HZ: f64 = 6.0;
-/// Factor by which the cutoff falls when a filter of second order is applied twice (Winter, *Biomechanics and Motor Control of Human
-/// Movement*, 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
+/// Factor by which the cutoff frequency falls when a filter of second order is applied twice (Winter, *Biomechanics and Motor Control of
+/// Human Movement*, 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
 const TWICE: f64 = 0.802;
 
-/// The error for a cutoff that is too high for the rate.
+/// The error for a cutoff frequency that is too high for the frame rate.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "a cutoff frequency of {cutoff_hz} Hz needs a frame rate above {} Hz, but the frame rate is {rate_hz:.3} Hz",
     needed_hz(*cutoff_hz)
 )]
 pub struct CutoffError {
-    /// The cutoff, in Hz.
+    /// The cutoff frequency, in Hz.
     pub cutoff_hz: f64,
-    /// Rate of the instants, in Hz.
+    /// Number of instants per second, in Hz.
     pub rate_hz: f64,
 }
 
-/// Returns the lowest rate at which a cutoff can be used, in Hz. The bilinear transform is usable up to 0.45 of the rate.
+/// Returns the lowest rate, in Hz, at which a cutoff frequency can be used. With the bilinear transform, the cutoff can be up to 0.45 of
+/// the rate.
 fn needed_hz(cutoff_hz: f64) -> f64 {
     cutoff_hz / TWICE / 0.45
 }
 
-/// Filters every joint: a Butterworth filter of second order forwards and backwards. Together, the two passes are of fourth order, have no
-/// delay, and pass half of the power at the cutoff.
+/// Filters every joint: a Butterworth filter of second order forwards and backwards. Together, the two passes are a filter of fourth order
+/// without delay, which passes half of the power at the cutoff.
 ///
-/// Gaps between measurements up to `fill_s` are first filled by cubic curves. Longer gaps split a track into pieces that are filtered
+/// Gaps of up to `fill_s` between measurements are first filled by cubic curves. Longer gaps split a track into pieces that are filtered
 /// separately. Non-uniform instants are interpolated (cubic) to a uniform grid and back; [`Report::resampled_s`] is the largest difference
-/// from the grid. Only joints with a side are rejected, at instants with uncertain sides. The result has no covariances.
+/// from the grid. The only measurements rejected are those of left and right joints at instants at which left and right are uncertain. The
+/// result has no covariances.
 ///
 /// The times must be [checked](Recorded::check).
 ///
@@ -94,7 +96,7 @@ fn off_grid(times: &[f64], step: f64) -> f64 {
     times.iter().map(off).fold(0.0, f64::max)
 }
 
-/// Returns the runs of measurements without long gaps and breaks.
+/// Returns the parts of a track that contain no long gap and no break.
 fn pieces<'a>(
     known: &'a [(usize, Vector3<f64>)],
     times: &[f64],
@@ -109,7 +111,7 @@ fn pieces<'a>(
     known.chunk_by(goes_on).collect()
 }
 
-/// Filters a piece, and fills all instants from the first to the last.
+/// Filters a part of a track, and computes positions for all instants from its first to its last.
 fn fill(
     track: &mut [Smoothed],
     piece: &[(usize, Vector3<f64>)],
@@ -218,7 +220,7 @@ fn once(values: &mut [f64], rate_hz: f64, cutoff_hz: f64) {
 mod tests {
     use super::*;
 
-    /// Returns the share of a sine's amplitude that remains in phase with the input.
+    /// Returns the fraction of a sine's amplitude that remains in phase with the input.
     fn passed(hz: f64) -> f64 {
         let rate = 120.0;
         let wave: Vec<f64> =

@@ -1,19 +1,19 @@
-//! Corrects joints that were exchanged with the joints on the other side of the body.
+//! Corrects joints that were confused with the same joints on the other side of the body.
 
 use crate::joint_track::Track;
 use crate::recorded::{Recorded, Sides};
 use crate::rts::{GATE, Usable, distance2};
 use crate::track::usable;
 
-/// Minimum log-odds at which one of two assignments of sides is chosen.
+/// Minimum log-odds at which one of two assignments of left and right is chosen.
 const LEAST_ODDS: f64 = 3.0;
-/// Maximum squared distance that one measurement can contribute: it may be wrong for many reasons.
+/// Maximum squared distance that one measurement can contribute; it is limited because a measurement may be wrong for many reasons.
 const MOST_DISTANCE2: f64 = 40.0;
 
-/// Corrects exchanged joints, and decides instants whose sides are uncertain.
+/// Swaps left and right joints that were confused, and decides left and right at instants at which they are uncertain.
 ///
 /// * `others`: for every joint, the same joint on the other side.
-/// * Returns the joints whose measurements changed, and the number of instants with uncertain sides that were kept, exchanged and left out.
+/// * Returns the joints whose measurements changed. Also returns the numbers of uncertain instants that were kept, swapped and left out.
 pub(crate) fn settle(
     recorded: &Recorded,
     others: &[Option<usize>],
@@ -44,16 +44,16 @@ pub(crate) fn settle(
     (changed, counts)
 }
 
-/// Returns the distance of a measurement from the track without this measurement.
+/// Returns the distance of a measurement from the track estimated without it.
 fn away(track: &Track, at: usize, measured: &Usable) -> Option<f64> {
     let known = track.known[at].as_ref()?;
     Some(distance2(known, measured.as_ref()?, 0.0, track.noise.scale))
 }
 
-/// Exchanges two joints if neither fits its own track but each fits the other track.
+/// Swaps two joints if neither fits its own track, but each fits the other's track.
 fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     let is_out = |track: &Track| track.used[at].is_some() && track.weights[at] == 0.0;
-    // One of the two joints may fit by chance where the limbs cross.
+    // Where the limbs cross, one of the two joints may fit by chance.
     if !is_out(&tracks[a]) || !is_out(&tracks[b]) {
         return false;
     }
@@ -71,9 +71,9 @@ fn exchange_pair(tracks: &mut [Track], [a, b]: [usize; 2], at: usize) -> bool {
     true
 }
 
-/// Decides an instant whose sides are uncertain, from all pairs together.
+/// Decides left and right at an instant at which they are uncertain, from all pairs of joints together.
 ///
-/// * Returns 0 if the instant was kept as measured, 1 if it was exchanged, 2 if it was left out.
+/// * Returns 0 if the instant was kept as measured, 1 if left and right were swapped, 2 if it was left out.
 fn unsure(
     recorded: &Recorded,
     pairs: &[[usize; 2]],
@@ -88,7 +88,7 @@ fn unsure(
             let (own, other) = if is_exchanged { (b, a) } else { (a, b) };
             let of_a = away(&tracks[a], at, &measured(own));
             let of_b = away(&tracks[b], at, &measured(other));
-            // A pair counts only if it is complete, so both sums cover the same measurements.
+            // Only complete pairs count, so that both sums cover the same measurements.
             let both = of_a.zip(of_b);
             both.map_or(0.0, |(a, b)| a.min(MOST_DISTANCE2) + b.min(MOST_DISTANCE2))
         };

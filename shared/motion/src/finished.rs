@@ -1,7 +1,7 @@
-//! Smoothing of a finished run; writes `pose3d-smooth.jsonl`, `smooth.json` and `angles.csv`.
+//! Smooths a finished run, and writes `pose3d-smooth.jsonl`, `smooth.json` and `angles.csv`.
 //!
-//! The measurements are read line by line, and read again while the result is written. So the
-//! required memory does not grow with the other entries of a line.
+//! The measurements are read line by line, and are read again while the result is written. So the required memory does not grow with the
+//! other content of the lines.
 
 mod folder;
 mod settings;
@@ -19,7 +19,7 @@ use runfiles::{SmoothReport, SmoothedJoint, SmoothedPerson, Unsure};
 pub use folder::{Person, Run, read, read_lines};
 pub use settings::{Method, Settings};
 
-/// The doubt reported if there is nothing to smooth.
+/// The reason to doubt the result that is reported if there is nothing to smooth.
 const NOTHING_MEASURED: &str = "no joint was measured in any frame";
 
 /// The files that are written beside the results.
@@ -32,9 +32,9 @@ pub struct Request {
     pub folder: PathBuf,
     /// Settings of the smoothing.
     pub settings: Settings,
-    /// Frames per second; replaces the times in the file.
+    /// Frame rate, in frames per second; if set, it replaces the times in the file.
     pub rate_hz: Option<f64>,
-    /// Direction against gravity; replaces the one from the calibration.
+    /// Upward direction; if set, it replaces the direction from the calibration.
     pub up: Option<UnitVector3<f64>>,
 }
 
@@ -51,7 +51,7 @@ pub struct Outcome {
 ///
 /// # Errors
 ///
-/// Files that cannot be read or written, invalid lines, times that do not ascend, or a cutoff above the limit for the
+/// Fails if a file cannot be read or written, if a line is invalid, if the times do not ascend, or if the cutoff is too high for the frame
 /// rate.
 pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure> {
     console.begin("", "reading");
@@ -77,7 +77,7 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
 ///
 /// # Errors
 ///
-/// A cutoff above the limit for the rate.
+/// Fails if the cutoff is too high for the frame rate.
 pub fn smoothed(recorded: &Recorded, settings: &Settings) -> Result<Motion, Failure> {
     let of_rts = crate::Settings {
         fill_s: settings.fill_s,
@@ -156,7 +156,7 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
     }
 }
 
-/// Returns the reasons to doubt the result. If there are several people, each reason contains the person.
+/// Returns the reasons to doubt the result. If there are several people, each reason names the person.
 fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(run.cut.clone());
@@ -202,7 +202,7 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
     doubts
 }
 
-/// Counts over all joints, for display.
+/// Returns counts over all joints, for display.
 pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
     let joints = || report.people.iter().flat_map(|person| person.joints.values());
     let sum = |of: fn(&SmoothedJoint) -> usize| joints().map(of).sum::<usize>();

@@ -8,14 +8,14 @@ use crate::tune;
 /// A joint during smoothing.
 #[derive(Debug)]
 pub(crate) struct Track {
-    /// Usable measurement at every instant.
+    /// The measurement at every instant, if it can be used.
     pub(crate) used: Vec<Usable>,
-    /// True if the measurement comes from the joint on the other side.
+    /// For every instant, true if the measurement comes from the same joint on the other side of the body.
     pub(crate) is_exchanged: Vec<bool>,
-    /// True if there is a measurement.
+    /// For every instant, true if there is a measurement.
     pub(crate) is_measured: Vec<bool>,
     pub(crate) noise: Noise,
-    /// State from all measurements at every instant; `None` outside stretches.
+    /// State estimated from all measurements, at every instant; `None` outside the continuous stretches of the track.
     pub(crate) known: Vec<Option<Known>>,
     /// Weights of the measurements.
     pub(crate) weights: Vec<f64>,
@@ -45,7 +45,7 @@ impl Track {
         tune::tune(&parts, prior)
     }
 
-    /// Smooths every stretch.
+    /// Smooths every continuous stretch of the track.
     pub(crate) fn smooth(&mut self, times: &[f64], stretches: &[[usize; 2]]) {
         self.known.fill(None);
         self.weights.fill(0.0);
@@ -102,8 +102,8 @@ impl Track {
 
     /// Sets the estimate at an instant.
     ///
-    /// If the covariances exceed the observed variation, the remaining error may vary too slowly to be observed. Smoothing does not
-    /// reduce it.
+    /// If the covariances are larger than the observed variation, the rest of the error may vary too slowly to be observed. Smoothing does
+    /// not reduce that part.
     ///
     /// * `measured`: the instant of the measurement with this covariance.
     fn put(&self, place: &mut Smoothed, [at, measured]: [usize; 2], state: State) {

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 /// Positions of one joint over time, in metres; `None` at instants without a position.
 pub type Path = [Option<Vector3<f64>>];
 
-/// A sum and its number of values.
+/// A sum, and the number of its values.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sum {
     /// Sum of the values.
@@ -40,10 +40,10 @@ pub struct Errors {
     pub velocity_m_s: Sum,
     /// Error of the acceleration by second differences, in m/s².
     pub acceleration_m_s2: Sum,
-    /// Change of the error from one instant to the next, in metres.
+    /// Change of the position error from one instant to the next, in metres.
     pub jitter_m: Sum,
-    /// Error along the true velocity times that velocity (m²/s), and the square of the velocity (m²/s²). Summed over instants, the
-    /// ratio of the first to the second is the delay of the track in seconds.
+    /// First, the position error along the true velocity, multiplied by that velocity (m²/s); second, the square of the velocity (m²/s²).
+    /// Both are summed over instants. The ratio of the first to the second is the delay of the track, in seconds.
     pub late: [f64; 2],
 }
 
@@ -59,13 +59,13 @@ impl Errors {
     }
 }
 
-/// Compares one joint with the truth, and adds to the errors of every instant.
+/// Compares one joint with the truth, and adds the differences to the errors of every instant.
 ///
 /// Differences are taken over three successive instants, for the track and the truth in the same way. They are compared only at the
 /// instants selected by `counted`, so that several tracks can be compared at the same instants.
 ///
 /// * `times`: times in seconds, in ascending order.
-/// * `counted`: for every instant, whether it is compared; the truth must be known there.
+/// * `counted`: for every instant, true if it is compared; the truth must be known there.
 pub fn add(errors: &mut [Errors], times: &[f64], track: &Path, truth: &Path, counted: &[bool]) {
     let both = |at: usize| {
         let is_counted = counted.get(at).copied().unwrap_or(false);

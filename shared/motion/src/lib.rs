@@ -1,15 +1,15 @@
-//! A person's joints over time: smooths them, fills and marks gaps, and computes angles between them.
+//! Smooths a person's joints over time, fills and marks gaps, and computes the angles between body segments.
 //!
-//! The crate is pure: it takes and returns numbers, except for the files of a finished run. Every measured joint has a covariance. The
-//! instants need not be uniform.
+//! The crate only computes with numbers, except that it reads and writes the files of a finished run. Every measured joint has a
+//! covariance. The instants need not be evenly spaced.
 //!
 //! | question | answer |
 //! |---|---|
 //! | where were the joints, given everything before and after? | [`smooth`] |
-//! | the same with a zero-phase low-pass filter, as used by laboratories | [`butterworth::filter`] |
+//! | the same, with a zero-phase low-pass filter as used in gait laboratories | [`butterworth::filter`] |
 //! | where are the joints now, given everything before? | [`live::Smoother`] |
 //! | what are the angles of hips, knees, shoulders? | [`angles::angles`] |
-//! | how to convert from and to the lines of a run's results? | [`lines`] |
+//! | how are these values read from and written to the result files of a run? | [`lines`] |
 //! | how good is a smoother, compared with the truth? | [`judge`] |
 #![forbid(unsafe_code)]
 

@@ -16,8 +16,8 @@ pub fn measured(line: &JointLine) -> Option<Measured> {
     })
 }
 
-/// Returns the certainty of a person's sides. They are certain unless the line says otherwise. Sides that are labelled as they appear in
-/// the pictures are also undecided, but they are consistent over all frames of a run.
+/// Returns how certain left and right of a person are. They are certain unless the line says otherwise. If left and right are labelled as
+/// they appear in the pictures, they are not decided either, but they are consistent over all frames of a run.
 pub fn sides(person: &PersonLine) -> Sides {
     if person.sides == Some(runfiles::Sides::Unsure) {
         Sides::Unsure
@@ -26,10 +26,10 @@ pub fn sides(person: &PersonLine) -> Sides {
     }
 }
 
-/// Returns a person of a line with smoothed joints; `None` if the person was neither measured nor has a smoothed joint.
+/// Returns a person's entry in a line, with smoothed joints; `None` if the person was not measured and has no smoothed joint.
 ///
 /// * `person`: the person as measured; `None` if the person is not in the line.
-/// * `joints`: for each joint its name, whether it is an extra keypoint, and the smoothed value. Other joints are left out.
+/// * `joints`: for each joint, its name, whether it is an extra keypoint, and its smoothed value. Joints that are not listed are left out.
 pub fn smoothed<'a>(
     id: u64,
     person: Option<PersonLine>,
@@ -53,7 +53,7 @@ pub fn smoothed<'a>(
                 JointLine::Placed(placed(estimate, old))
             }
             Err(why) => match old {
-                // The joint had no position before; the original reason is kept.
+                // The joint had no measured position either; the original reason is kept.
                 Some(missing @ JointLine::Missing { .. }) => missing.clone(),
                 _ => JointLine::Missing {
                     status: why.name().to_owned(),
@@ -73,7 +73,7 @@ pub fn smoothed<'a>(
     (was_there || !person.states.is_empty()).then_some(person)
 }
 
-/// Returns a line in which the people are replaced.
+/// Returns the line with the given people instead of its own.
 pub fn with_people(mut line: FrameLine, people: Vec<PersonLine>) -> FrameLine {
     if people.iter().any(|person| person.status == FrameLine::OK) {
         FrameLine::OK.clone_into(&mut line.status);

@@ -8,15 +8,15 @@ use crate::role::Role;
 use crate::track::{Absent, Measured, Smoothed};
 use kalman::Models;
 
-/// Default maximum time between two measurements of a joint that is filled, in seconds.
+/// Default for how long a joint without measurements is given predicted positions, in seconds.
 pub const FILL_S: f64 = 0.25;
 
-/// Smooths the joints of a person as they arrive. Each joint has several Kalman filters with different jerk densities, weighted by
-/// the quality of their predictions.
+/// Smooths the joints of a person as they arrive. Each joint has several Kalman filters with different jerk densities, which are weighted
+/// by how good their predictions are.
 #[derive(Debug)]
 pub struct Smoother {
     joints: Vec<Models>,
-    /// True for every joint that has a side.
+    /// For every joint, true if it belongs to the left or right side.
     is_sided: Vec<bool>,
     fill_s: f64,
     delay: Delay,
@@ -45,8 +45,8 @@ impl Smoother {
     /// Returns the joints at an instant.
     ///
     /// * `time_s`: time of the instant; if it is not later than the previous instant, the smoother starts again without history.
-    /// * `measured`: measurements in the order of the names; joints missing at the end count as not measured.
-    /// * `sides`: certainty of the sides; if they are uncertain, joints with a side are left out.
+    /// * `measured`: measurements in the order of the names. The list may be shorter; the remaining joints then count as not measured.
+    /// * `sides`: whether left and right are certain; if not, left and right joints are left out.
     pub fn step(
         &mut self,
         time_s: f64,
@@ -72,7 +72,7 @@ impl Smoother {
         all
     }
 
-    /// Returns the mean delay added to movement at 1 Hz, in seconds; `None` before anything was measured twice.
+    /// Returns the mean delay that the smoother causes for movement at 1 Hz, in seconds; `None` until a joint has been measured twice.
     pub fn delay_s(&self) -> Option<f64> {
         (self.delay.n > 0.0).then(|| self.delay.sum_s / self.delay.n)
     }

@@ -1,6 +1,6 @@
 //! The motion model: a point whose jerk is white noise, measured with a separate covariance at every instant.
 //!
-//! The state consists of position, velocity and acceleration in three axes, which the covariances of measurements couple. Between two
+//! The state consists of position, velocity and acceleration along three axes; the covariances of measurements couple the axes. Between two
 //! instants `dt` apart, the acceleration follows a random walk: the Wiener-process acceleration model (Bar-Shalom, Li & Kirubarajan,
 //! *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.3). Its spectral density, here called the jerk density, has
 //! the unit m²/s⁵.
@@ -22,10 +22,10 @@ pub(crate) struct Belief {
     pub(crate) covariance: Matrix9,
 }
 
-/// Agreement of a measurement with the prediction.
+/// How well a measurement agrees with the prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Innovation {
-    /// Squared Mahalanobis distance; its expectation is 3.
+    /// Squared Mahalanobis distance; its expected value is 3.
     pub(crate) distance2: f64,
     /// Logarithm of the determinant of the covariance of the difference.
     pub(crate) log_determinant: f64,
@@ -34,7 +34,7 @@ pub(crate) struct Innovation {
 impl Belief {
     /// Creates the state from the first measurement.
     ///
-    /// * `scale`: unit of all covariances in square metres; 1 for unscaled covariances.
+    /// * `scale`: factor by which all covariances were divided; 1 if they were not scaled.
     pub(crate) fn first(position: Vector3<f64>, covariance: Matrix3<f64>, scale: f64) -> Self {
         let mut mean = Vector9::zeros();
         mean.fixed_rows_mut::<3>(0).copy_from(&position);
@@ -88,7 +88,7 @@ impl Belief {
         Self { mean, covariance }
     }
 
-    /// Returns the agreement of a measurement with the state before it is used; `None` if it cannot be computed.
+    /// Returns how well a measurement agrees with the state before the measurement is used; `None` if this cannot be computed.
     pub(crate) fn innovation(
         &self,
         position: &Vector3<f64>,
@@ -106,7 +106,7 @@ impl Belief {
         })
     }
 
-    /// Returns the state after a measurement; unchanged if the measurement cannot be used numerically.
+    /// Returns the state after a measurement; the state is unchanged if the measurement is numerically unusable.
     #[must_use]
     pub(crate) fn with(&self, position: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let total = self.position_covariance() + covariance;

@@ -1,11 +1,11 @@
-//! Jerk density of a joint, and reliability of the covariances of its measurements.
+//! Jerk density of a joint, and a scale that shows whether the covariances of its measurements are right.
 
 /// Noise parameters of a track.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Spectral density of the jerk, in m²/s⁵: a measure of the restlessness of the joint.
+    /// Spectral density of the jerk, in m²/s⁵: a measure of how abruptly the joint moves.
     pub jerk: f64,
-    /// Factor of the covariances: 1 if they are right, above 1 if they are too small.
+    /// Factor by which the covariances must be multiplied: 1 if they are right, above 1 if they are too small.
     pub scale: f64,
 }
 

@@ -3,10 +3,10 @@
 use crate::noise::Prior;
 use crate::role::Role;
 
-/// Returns the expectation for a joint, by its role.
+/// Returns the expected jerk density of a joint with a given role.
 ///
-/// The values are our own, rounded: the maximum of the likelihood for the ten synthetic actions of seed 1, which are not used for any
-/// evaluation. The spread is wide, so a run of a few seconds outweighs the expectation.
+/// The values are our own: maximum-likelihood estimates, rounded, from the ten synthetic actions of seed 1, which are not used for any
+/// evaluation. The spread is wide, so a run of a few seconds outweighs the expected value.
 pub fn prior(role: Option<Role>) -> Prior {
     let log10_jerk = match role {
         Some(

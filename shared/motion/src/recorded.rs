@@ -6,13 +6,13 @@ use crate::noise::Noise;
 use crate::role::{Role, mirrored_name};
 use crate::track::{Absent, Measured, Smoothed, State, usable};
 
-/// Certainty of left and right of a measured skeleton.
+/// How certain left and right of a measured skeleton are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sides {
-    /// Left and right are correct, or nothing says otherwise.
+    /// Left and right are correct, or at least nothing indicates that they are wrong.
     #[default]
     Sure,
-    /// Left and right may be exchanged.
+    /// Left and right may be swapped.
     Unsure,
 }
 
@@ -21,19 +21,19 @@ pub enum Sides {
 pub struct Joint {
     /// Name of the joint.
     pub name: String,
-    /// Role of the joint; `None` for a keypoint that has no role here.
+    /// Role of the joint; `None` for a keypoint without a role in this crate.
     pub role: Option<Role>,
     /// Measurement at every instant.
     pub measured: Vec<Option<Measured>>,
 }
 
 impl Joint {
-    /// Measured position, if there is a measurement.
+    /// Returns the measured position, if there is a measurement.
     pub(crate) fn position(&self, at: usize) -> Option<Vector3<f64>> {
         usable(self.measured[at].as_ref()?).map(|measured| measured.0)
     }
 
-    /// Reason why there is no position at an instant that was not filled.
+    /// Returns the reason why there is no position at an instant that was not filled.
     pub(crate) fn absent(&self, at: usize) -> Absent {
         if self.measured[at].is_some() {
             Absent::Rejected
@@ -48,13 +48,13 @@ impl Joint {
 pub struct Recorded {
     /// The instants, in seconds, in ascending order.
     pub times: Vec<f64>,
-    /// Certainty of the sides at every instant.
+    /// Whether left and right are certain, at every instant.
     pub sides: Vec<Sides>,
     /// The joints of the person.
     pub joints: Vec<Joint>,
 }
 
-/// Reason why the instants cannot be used.
+/// Reason why the instants were rejected.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TimesError {
     /// An instant is not later than the previous instant.
@@ -75,10 +75,10 @@ pub enum TimesError {
         /// Index of the instant, counted from 0.
         at: usize,
     },
-    /// The length of a row differs from the number of instants.
+    /// The number of values in a list differs from the number of instants.
     #[error("there are {got} values for {expected} instants")]
     Length {
-        /// Number of values in the row.
+        /// Number of values in the list.
         got: usize,
         /// Number of instants.
         expected: usize,
@@ -116,15 +116,16 @@ impl Recorded {
         Ok(())
     }
 
-    /// Returns a predicate of a joint and an instant: true if the measurement is left out because its side is
-    /// uncertain. If the sides are uncertain at all instants, nothing is left out, since otherwise everything would be.
+    /// Returns a function of a joint and an instant that returns true if the measurement is left out because its side is uncertain. If left
+    /// and right are uncertain at all instants, nothing is left out, because otherwise nothing would remain.
     pub(crate) fn withheld(&self) -> impl Fn(usize, usize) -> bool {
         let others = self.other_sides();
         let is_some_sure = self.sides.contains(&Sides::Sure);
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
-    /// Counts the instants with uncertain sides, for a method that does not decide the sides. The counts are: kept, exchanged, left out.
+    /// Counts the instants at which left and right are uncertain, for a method that does not decide them. The counts are: kept, swapped,
+    /// left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
         if self.sides.contains(&Sides::Sure) {
@@ -141,11 +142,11 @@ impl Recorded {
         self.joints.iter().map(other).collect()
     }
 
-    /// Returns the indices at which another person begins, or the same person at another place. At such an index, the whole body is farther
-    /// away than a person can move, and stays at the new place.
+    /// Returns the indices at which the track jumps to another person, or to the same person somewhere else. At such an index, the whole
+    /// body is farther away than a person can move, and stays there.
     ///
-    /// The limit is half a metre plus 12 m/s, faster than anyone runs. The position of the body is the median of its joints along each
-    /// axis.
+    /// The limit is half a metre, plus 12 m for every second, which is faster than anyone runs. The position of the body is the median of
+    /// its joints along each axis.
     pub(crate) fn breaks(&self) -> Vec<usize> {
         let centres: Vec<(usize, Vector3<f64>)> =
             (0..self.times.len()).filter_map(|at| Some((at, self.centre(at)?))).collect();
@@ -192,26 +193,26 @@ pub(crate) fn median(values: Vec<f64>) -> f64 {
 pub struct Motion {
     /// Smoothed positions of every joint, in the order of [`Recorded::joints`], at every instant.
     pub joints: Vec<Vec<Smoothed>>,
-    /// Findings about the person.
+    /// Report on how the person was smoothed.
     pub report: Report,
 }
 
-/// Findings about a person over time.
+/// Report on how a person's joints were smoothed.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Report {
-    /// Noise of every joint; `None` if the method does not estimate it, or nothing was measured.
+    /// Noise parameters of every joint; `None` if the method does not estimate them, or if nothing was measured.
     pub noise: Vec<Option<Noise>>,
     /// For every joint, the number of instants in each state.
     pub counts: Vec<Counts>,
     /// Instants at which another person began.
     pub breaks: Vec<usize>,
-    /// Number of instants with uncertain sides that were kept as measured, exchanged, and left out.
+    /// Numbers of instants with uncertain left and right that were kept as measured, swapped, and left out.
     pub unsure: [usize; 3],
     /// Bones that were kept at a constant length: two joints, and the length in metres.
     pub bones: Vec<([usize; 2], f64)>,
-    /// Largest difference of an instant from the uniform grid, in seconds; `None` if there is no grid.
+    /// Largest difference between an instant and the uniform grid, in seconds; `None` if no grid was used.
     pub resampled_s: Option<f64>,
-    /// Delay of a causal method, in seconds; 0 for methods that look ahead.
+    /// Delay, in seconds, of a method that only uses earlier measurements; 0 for methods that also use later ones.
     pub delay_s: f64,
 }
 
@@ -220,7 +221,7 @@ pub struct Report {
 pub struct Counts {
     /// Instants at which the joint was measured and used.
     pub measured: usize,
-    /// Instants at which the joint was measured under the name of the joint on the other side.
+    /// Instants at which the measurement named after the same joint on the other side was used.
     pub exchanged: usize,
     /// Instants at which the joint was not measured, but filled.
     pub filled: usize,

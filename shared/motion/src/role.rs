@@ -1,4 +1,4 @@
-//! Role of a joint, by its name in the results.
+//! The role of a joint, derived from its name in the results.
 
 /// A side of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,7 +29,7 @@ impl Side {
     }
 }
 
-/// Role of a joint.
+/// Role of a joint: which joint of the body it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[expect(missing_docs, reason = "the names of joints")]
 pub enum Role {
@@ -47,8 +47,8 @@ pub enum Role {
     SmallToe(Side),
 }
 
-/// Names that do not begin with the side: those of `skeleton::HUMANEVA20`, and those used by networks. The twins of `HumanEva`, where
-/// one joint is an end of two limbs, have the role once.
+/// Names that do not begin with the side: those of `skeleton::HUMANEVA20`, and those used by networks. If `HumanEva` has two names for one
+/// joint, which is an end of two limbs, only one of them is listed.
 const NAMES: [(&str, Role); 19] = [
     ("head", Role::Head),
     ("neck", Role::Neck),
@@ -136,7 +136,7 @@ pub fn mirrored_name(name: &str) -> Option<String> {
 
 /// Pairs of joints with a constant distance: the segments of the limbs.
 ///
-/// The distances across the trunk are not included: they change by centimetres as shoulders move and the back bends.
+/// Distances across the trunk are not included, because they change by centimetres when shoulders move or the back bends.
 pub const RIGID: [[Role; 2]; 9] = [
     [Role::Hip(Side::Right), Role::Knee(Side::Right)],
     [Role::Knee(Side::Right), Role::Ankle(Side::Right)],

@@ -1,4 +1,4 @@
-//! The Rauch-Tung-Striebel smoother over one stretch of a track, with small weights for outliers.
+//! The Rauch-Tung-Striebel smoother over one continuous stretch of a track, with small weights for outliers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,30 +8,31 @@ use crate::noise::Noise;
 /// A usable measurement.
 pub(crate) type Usable = Option<(Vector3<f64>, Matrix3<f64>)>;
 
-/// Degrees of freedom of the heavy-tailed (Student) noise for which measurements are weighted.
+/// Degrees of freedom of the heavy-tailed (Student) noise that determines the weights of measurements.
 pub(crate) const FREEDOM: f64 = 4.0;
-/// A measurement is rejected if its squared Mahalanobis distance from the other measurements is larger; this rejects 1 of 10 000 good
-/// measurements.
+/// A measurement is rejected if its squared Mahalanobis distance from the estimate by the other measurements exceeds this limit. This
+/// rejects 1 of 10 000 good measurements.
 pub(crate) const GATE: f64 = 21.11;
-/// Factor on the covariance of the other measurements, because movement is sometimes less predictable than over the whole track: a punch
-/// is not an outlier. At high rates, it has little effect, because the measurement's own covariance dominates the sum.
+/// Factor on the covariance of the estimate by the other measurements. It is above 1 because movement is sometimes less predictable than
+/// the track as a whole: a punch is not an outlier. At high frame rates, it has little effect, because the measurement's own covariance
+/// dominates the sum.
 const SURPRISE: f64 = 9.0;
-/// Number of rounds of computing weights; they have converged by then.
+/// Number of rounds in which the weights are computed; they converge within this number.
 const N_ROUNDS: usize = 4;
 
-/// Position of a joint, with its covariance, which is not scaled, like the covariances of the measurements.
+/// Position of a joint with its covariance, which has the same scale as the covariances of the measurements.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Known {
     pub(crate) position: Vector3<f64>,
     pub(crate) covariance: Matrix3<f64>,
 }
 
-/// State from all measurements at the instants of a stretch.
+/// States of a stretch, computed from all of its measurements.
 #[derive(Debug)]
 pub(crate) struct Stretch {
     /// State at every instant; empty if there is no measurement.
     pub(crate) known: Vec<Known>,
-    /// Weight of the measurement at every instant, 0..1; 0 if it is rejected or missing.
+    /// Weight of the measurement at every instant, from 0 to 1; 0 if it is rejected or missing.
     pub(crate) weights: Vec<f64>,
 }
 
@@ -42,9 +43,9 @@ pub(crate) fn weight(distance2: f64) -> f64 {
     ((FREEDOM + 3.0) / (FREEDOM + distance2)).min(1.0)
 }
 
-/// Filters forwards; `each` receives every measurement before it is used and returns its weight, 0 to leave it out.
+/// Filters forwards. `each` is called with every measurement before it is used, and returns its weight; a weight of 0 leaves it out.
 ///
-/// * Returns the state at every instant up to the last; instants before the first used measurement repeat that measurement.
+/// * Returns the state at every instant up to the last. Instants before the first used measurement have the state of that measurement.
 pub(crate) fn forwards(
     times: &[f64],
     measured: &[Usable],

@@ -1,4 +1,4 @@
-//! The offline smoother over all joints of a person: noise, outliers, exchanged sides, gaps, bones.
+//! The offline smoother over all joints of a person: handles noise, outliers, swapped left and right, gaps and bone lengths.
 
 use crate::bones;
 use crate::exchange;
@@ -8,16 +8,16 @@ use crate::recorded::{Counts, Joint, Motion, Recorded, Report};
 use crate::rts::Usable;
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
-/// Maximum time without a measurement of a joint, in seconds. After a longer time, the joint is smoothed separately, because earlier
-/// measurements carry no information.
+/// Maximum time without a measurement of a joint, in seconds. After a longer time, the joint is smoothed as a separate stretch, because
+/// earlier measurements carry no information.
 const SPLIT_S: f64 = 1.0;
 
 /// Settings of the smoother.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Maximum time between two measurements that is filled, in seconds.
+    /// Maximum time between two measurements, in seconds, for the gap to be filled.
     pub fill_s: f64,
-    /// Keep the lengths of the limbs' bones constant.
+    /// If true, keep the bone lengths of the limbs constant.
     pub constant_bones: bool,
 }
 
@@ -32,12 +32,12 @@ impl Default for Settings {
 
 /// Smooths a person's joints, using all measurements before and after.
 ///
-/// 1. If the person suddenly changes to another person, the smoother starts again without history.
+/// 1. If the track suddenly jumps to another person, the smoother starts again without history.
 /// 2. The jerk density and the scale of the covariances are estimated for every joint from the measurements.
-/// 3. Every joint is smoothed; measurements that contradict all others are rejected. Joints with a side are left out if the sides
-///    are uncertain.
-/// 4. Left and right are exchanged if that fits better. At instants with uncertain sides, the assignment that fits is used; if neither fits
-///    clearly, the instant is left out. The changed joints are smoothed again.
+/// 3. Every joint is smoothed; measurements that contradict all others are rejected. Left and right joints are left out while left and
+///    right are uncertain.
+/// 4. Left and right are swapped if that fits better. At instants at which they are uncertain, the assignment that fits is used; if neither
+///    fits clearly, the instant is left out. The changed joints are smoothed again.
 /// 5. Short gaps are filled and marked.
 /// 6. If requested, each bone of the limbs gets its median length.
 ///
@@ -68,7 +68,8 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
         track.smooth(&recorded.times, &stretches(&track.used));
     }
     let noise = tracks.iter().map(Track::known_noise).collect();
-    // Each track is dropped once its joint is done: a long run would otherwise need the memory of both.
+    // Each track is dropped once its joint is finished. Otherwise, a long run would need the memory for the tracks and the results at the
+    // same time.
     let filled = |track: Track| track.filled(&recorded.times, settings.fill_s);
     let mut motion = Motion {
         joints: tracks.into_iter().map(filled).collect(),
@@ -86,7 +87,8 @@ pub fn smooth(recorded: &Recorded, settings: &Settings) -> Motion {
     motion
 }
 
-/// Stretches of a track that can be smoothed as a whole: from the first measurement to one past the last, without long gaps and breaks.
+/// Returns the stretches of a track that can be smoothed as a whole: each extends from the first measurement to one past the last, without
+/// long gaps and breaks.
 fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> Vec<[usize; 2]> {
     let mut stretches: Vec<[usize; 2]> = Vec::new();
     for at in (0..used.len()).filter(|&at| used[at].is_some()) {
@@ -102,7 +104,7 @@ fn stretches(times: &[f64], used: &[Usable], breaks: &[usize], fill_s: f64) -> V
     stretches
 }
 
-/// Returns the measurements unchanged, including joints with a side at instants with uncertain sides.
+/// Returns the measurements unchanged, including those of left and right joints at instants at which left and right are uncertain.
 pub fn as_measured(recorded: &Recorded) -> Motion {
     let estimate = |measured: &Option<Measured>| -> Smoothed {
         let measured = measured

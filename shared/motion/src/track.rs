@@ -11,17 +11,17 @@ pub struct Measured {
     pub covariance: Option<Matrix3<f64>>,
 }
 
-/// Basis of a position in a smoothed track.
+/// Where a position in a smoothed track comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// A measurement of this joint, with the measurements around it.
+    /// From a measurement of this joint, and from the measurements around it.
     Measured,
-    /// The measurement of the joint on the other side of the body, because it fits and the joint's own does not: left and right were
-    /// exchanged.
+    /// From the measurement of the same joint on the other side of the body, because it fits and the joint's own measurement does not: left
+    /// and right were swapped.
     Exchanged,
-    /// Only measurements before and after: there was no measurement.
+    /// Only from measurements before and after, because there was no measurement.
     Filled,
-    /// Only measurements before and after: the measurement contradicts them, or its side is uncertain.
+    /// Only from measurements before and after, because the measurement contradicts them, or because its side is uncertain.
     Rejected,
 }
 
@@ -44,16 +44,16 @@ pub struct Estimate {
     pub position: Vector3<f64>,
     /// Covariance of the position, in square metres; `None` if the method does not provide it.
     pub covariance: Option<Matrix3<f64>>,
-    /// Basis of the position.
+    /// Where the position comes from.
     pub state: State,
 }
 
 /// Reason why there is no position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Absent {
-    /// There is no measurement, and the gap is too long to be filled, or open at one end.
+    /// There is no measurement, and the gap cannot be filled: it is too long, or has a measurement on one side only.
     Gap,
-    /// The measurement contradicts the others, and the gap without it is too long to be filled.
+    /// The measurement contradicts the others, and the gap that it leaves is too long to be filled.
     Rejected,
 }
 
@@ -70,15 +70,15 @@ impl Absent {
 /// One instant of a smoothed track.
 pub type Smoothed = Result<Estimate, Absent>;
 
-/// Standard deviation assumed for a measurement without a covariance before its scale is estimated, in metres.
+/// Standard deviation that is assumed, until the scale has been estimated, for a measurement without a covariance, in metres.
 const UNKNOWN_SD_M: f64 = 0.02;
-/// Limits to which standard deviations of a measurement are clipped, in metres. Smaller deviations are rounding errors; larger deviations
-/// carry no information.
+/// Limits to which standard deviations of a measurement are clipped, in metres. Smaller ones are due to rounding; measurements with larger
+/// ones carry no information.
 const SD_M: [f64; 2] = [1e-5, 10.0];
 /// Maximum distance of a measurement from the origin, in metres.
 const FARTHEST_M: f64 = 1e6;
 
-/// Returns a usable measurement with a finite position and a positive definite covariance; `None` if the position is not usable.
+/// Returns the measurement with a finite position and a positive definite covariance; `None` if the position cannot be used.
 pub(crate) fn usable(it: &Measured) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let is_near = |x: &f64| x.abs() < FARTHEST_M;
     if !it.position.iter().all(is_near) {

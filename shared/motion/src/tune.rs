@@ -5,30 +5,30 @@ use statistics::Sorted;
 use crate::noise::{Noise, Prior};
 use crate::rts::{FREEDOM, Usable, forwards, weight};
 
-/// Minimum, maximum and step of the jerk densities that are tried, as common logarithms.
+/// Minimum jerk density that is tried, as a common logarithm; the next constants are the maximum and the step.
 const LEAST: f64 = -1.0;
 const MOST: f64 = 5.5;
 const STEP: f64 = 0.5;
 /// Standard deviation of the natural logarithm of the scale before any measurement: covariances are correct to within a factor of 3.
 const SCALE_SD: f64 = 1.0;
-/// Weight of the likelihood. People do not move exactly as the model assumes, so the innovations carry less information.
-/// Without this weight, fast movement at a low rate is taken for noise.
+/// Weight of the likelihood. It is below 1 because people do not move exactly as the model assumes, so the innovations carry less
+/// information. Otherwise, fast movement at a low frame rate would be taken for noise.
 const SHARE: f64 = 0.1;
 /// Minimum and maximum plausible scale.
 const SCALES: [f64; 2] = [1e-4, 1e4];
-/// Minimum number of measurements for an estimate.
+/// Minimum number of measurements from which noise parameters are estimated.
 const LEAST_MEASURED: usize = 12;
-/// Number of windows that are used of a long track, and (below) number of instants of each window.
+/// Number of windows that are used of a long track; the next constant is the number of instants in each window.
 const N_WINDOWS: usize = 6;
 const WINDOW: usize = 250;
-/// Number of innovations at the beginning of a window that are not counted: they depend on the initial assumptions.
+/// Number of innovations at the beginning of a window that are not counted, because they depend on the initial assumptions.
 const SKIPPED: usize = 3;
 
-/// Estimates the noise parameters of a track by maximum likelihood of the innovations, under noise with heavy tails. The search uses a grid
-/// of jerk densities, with the scale estimated for each.
+/// Estimates the noise parameters of a track by maximising the likelihood of the innovations, assuming noise with heavy tails. The search
+/// uses a grid of jerk densities, with the scale estimated for each.
 ///
-/// A filter depends only on the ratio of the two parameters. So for every ratio, one run gives all innovations and the scale that
-/// explains them best. For a long track, a number of windows is used.
+/// A filter depends only on the ratio of the two parameters. So for every ratio, one run gives all innovations and the scale that explains
+/// them best. For a long track, only some windows are used.
 ///
 /// * `stretches`: stretches of the track, each with its times in ascending order.
 pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
@@ -63,7 +63,7 @@ pub(crate) fn tune(stretches: &[(&[f64], &[Usable])], prior: Prior) -> Noise {
     }
 }
 
-/// Returns the position of the maximum of the parabola through the best value and its neighbours, in steps after the best.
+/// Returns the position of the maximum of the parabola through the best value and its neighbours, in steps relative to the best value.
 fn vertex(tried: &[(f64, f64, f64)], best: usize) -> f64 {
     if best == 0 || best + 1 >= tried.len() {
         return 0.0;
@@ -129,7 +129,7 @@ fn score(windows: &[(&[f64], &[Usable])], jerk: f64, scale: f64) -> (f64, f64) {
     (score, scale)
 }
 
-/// Ratio of [`student_scale`] to the variance if the noise is in fact Gaussian, in three dimensions.
+/// Ratio of [`student_scale`] to the variance if the noise is actually Gaussian, in three dimensions.
 const GAUSSIAN_SHARE: f64 = 0.757;
 
 /// Returns a scale of squared distances that is correct for Gaussian noise and robust against outliers.

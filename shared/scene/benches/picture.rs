@@ -1,5 +1,5 @@
-//! Benchmark of one picture of one camera, 640x480, four samples per pixel: walking in front of the cameras of HumanEva, one thread. Also
-//! measures the parts that are created only once: the person and a camera's background.
+//! Benchmark of one picture of one camera, 640x480, four samples per pixel, on one thread: a person walks in front of the cameras of
+//! HumanEva. The benchmark also measures what is created only once: the person and the camera's background.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its measurements")]
 

@@ -1,4 +1,4 @@
-//! The background of one camera: everything but the person. Rendered once, because it does not move.
+//! The background of one camera: everything but the people. It is rendered once, because it does not move.
 
 use footage::Size;
 use geometry::Camera;
@@ -9,7 +9,7 @@ use crate::photo::Photo;
 use crate::raster::{SUB, Samples};
 use crate::room::{Hit, Room};
 
-/// The pixels of the background, with the data needed to add a person and the person's shadow.
+/// The pixels of the background, with the data needed to add people and their shadows.
 #[derive(Debug, Clone)]
 pub(crate) struct Backdrop {
     pub(crate) size: Size,
@@ -23,7 +23,7 @@ pub(crate) struct Backdrop {
 /// A pixel of the background.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pixel {
-    /// Light that reaches the camera without the key lamp, and light of the key lamp.
+    /// Light that reaches the camera without the key lamp, and the additional light that comes from the key lamp.
     pub(crate) base: Linear,
     pub(crate) key: Linear,
     /// Coordinates perpendicular to the rays of the key lamp, and along the rays towards the lamp, in metres.
@@ -34,8 +34,8 @@ pub(crate) struct Pixel {
 impl Backdrop {
     /// Casts rays through every sample.
     ///
-    /// * `camera`: in the frame of the stage.
-    /// * `photo`: replaces the picture of the room, which still receives the shadow and occludes the person.
+    /// * `camera`: the camera, in the frame of the stage.
+    /// * `photo`: photograph shown instead of the room. The room still determines where shadows fall and what hides the person.
     pub(crate) fn new(camera: &Camera, room: &Room, photo: Option<&Photo>) -> Self {
         let [width, height] = camera.intrinsics.size.map(|size| size as usize);
         let eye: Point3<f32> = camera.centre_in_world().cast();
@@ -81,8 +81,8 @@ struct View<'a> {
 }
 
 impl View<'_> {
-    /// Undistorted normalised points of a lattice of pixel centres, with one more column and row than the picture;
-    /// NaN outside the valid range of the lens.
+    /// Returns undistorted normalised points on a grid of pixel centres that has one more column and row than the picture; NaN outside the
+    /// valid range of the lens.
     fn directions(&self, width: usize, height: usize) -> Vec<Point2<f32>> {
         let nothing = Point2::new(f32::NAN, f32::NAN);
         let at = |i: usize| {
@@ -94,10 +94,7 @@ impl View<'_> {
         (0..(width + 1) * (height + 1)).map(at).collect()
     }
 
-    /// Returns the mean of the samples of a pixel.
-    ///
-    /// * `here`, `right` and `below`: normalised points between which the samples are placed.
-    /// * `set_near`: receives 1 / depth of every sample.
+    /// Returns the colour of a pixel as the mean of its samples.
     fn pixel(
         &self,
         [here, right, below]: [Point2<f32>; 3],
@@ -131,14 +128,14 @@ impl View<'_> {
     }
 }
 
-/// Ambient light and light of the key lamp that a place reflects to the camera.
+/// Returns the ambient light and the light of the key lamp that a point reflects to the camera.
 fn lit(room: &Room, hit: &Hit, sub: usize) -> (Linear, Linear) {
     if hit.shines {
         return (hit.colour, Linear::zeros());
     }
     let around = room.light.around(&hit.normal) * (1.0 - hit.dim);
     let direct = room.light.direct(&hit.normal);
-    // Every sample uses a different part of the lamp, which softens the edges of shadows.
+    // Every sample uses a different part of the lamp, so that the edges of shadows are soft.
     let spread = 0.05;
     let [u, v] = [(sub % SUB) as f32 - 0.5, (sub / SUB) as f32 - 0.5];
     let towards = room.light.to_key + Vector3::new(u + v, u - v, 0.0) * spread;

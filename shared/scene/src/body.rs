@@ -17,22 +17,22 @@ pub(crate) const ABDOMEN: usize = 1;
 pub(crate) const CHEST: usize = 2;
 pub(crate) const NECK: usize = 3;
 pub(crate) const HEAD: usize = 4;
-/// First bone of each arm: collar, upper arm, forearm and hand follow each other. Left first.
+/// First bone of each arm, left first. The bones that follow it are the upper arm, the forearm and the hand.
 pub(crate) const COLLAR: [usize; 2] = [5, 9];
 pub(crate) const UPPER_ARM: [usize; 2] = [6, 10];
 pub(crate) const FOREARM: [usize; 2] = [7, 11];
 pub(crate) const HAND: [usize; 2] = [8, 12];
-/// First bone of each leg: thigh, shin and foot follow each other. Left first.
+/// First bone of each leg, left first. The bones that follow it are the shin and the foot.
 pub(crate) const THIGH: [usize; 2] = [13, 16];
 pub(crate) const SHIN: [usize; 2] = [14, 17];
 pub(crate) const FOOT: [usize; 2] = [15, 18];
 
-/// Index of the left side in the pairs above.
+/// Index of the left side in [`COLLAR`] and [`THIGH`].
 pub(crate) const LEFT: usize = 0;
-/// Index of the right side in the pairs above.
+/// Index of the right side in [`COLLAR`] and [`THIGH`].
 pub(crate) const RIGHT: usize = 1;
 
-/// The parent of every bone; the pelvis has none.
+/// The parent of every bone; `None` for the pelvis.
 pub(crate) const PARENT: [Option<usize>; N_BONES] = [
     None,
     Some(PELVIS),
@@ -55,7 +55,7 @@ pub(crate) const PARENT: [Option<usize>; N_BONES] = [
     Some(17),
 ];
 
-/// +1 for bones of the left side, -1 for bones of the right side, 0 in the middle.
+/// Returns +1 for bones of the left side, -1 for bones of the right side, and 0 for bones in the middle.
 pub(crate) fn side_of(bone: usize) -> f64 {
     match bone {
         5..=8 | 13..=15 => 1.0,
@@ -66,9 +66,9 @@ pub(crate) fn side_of(bone: usize) -> f64 {
 
 /// Flexion, abduction and twist of every joint in degrees; the values of the root are ignored.
 ///
-/// Flexion: the trunk, neck and head nod forward, arms and legs swing forward, elbows and knees fold, and toes rise. Abduction: limbs move
-/// away from the middle, collars rise, and the trunk bends to the right. Twist is the opposite of inward rotation (the front of the limb
-/// turns outward); the trunk turns left.
+/// Positive flexion: the trunk, neck and head bend forward, arms and legs swing forward, elbows and knees bend, and toes rise. Positive
+/// abduction: limbs move away from the middle, collar bones rise, and the trunk bends to the right. Positive twist: the front of a limb
+/// turns outward, and the trunk turns left.
 pub(crate) type Angles = [[f64; 3]; N_BONES];
 
 /// Clamps angles to the limits of the joints.
@@ -81,7 +81,7 @@ pub(crate) fn clamped(angles: &Angles) -> Angles {
     })
 }
 
-/// Place of a person, and the rotations of the joints.
+/// Position and direction of a person, and the rotations of the joints.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Pose {
     /// Frame of the pelvis in the frame of the room.
@@ -102,7 +102,7 @@ pub(crate) struct Bones {
     pub(crate) fingertip: Vector3<f64>,
 }
 
-/// The individual proportions of a skeleton.
+/// The individual body proportions of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Proportions {
     /// Standing height, in metres.
@@ -115,8 +115,8 @@ pub(crate) struct Proportions {
 }
 
 impl Bones {
-    /// Creates a skeleton with shares of the height after Drillis & Contini (1966), as reprinted in Winter, *Biomechanics and
-    /// Motor Control of Human Movement*. The joints within the trunk are placed by eye.
+    /// Creates a skeleton with bone lengths as fractions of the height, after Drillis & Contini (1966), as reprinted in Winter,
+    /// *Biomechanics and Motor Control of Human Movement*. The positions of the joints within the trunk were chosen by eye.
     pub(crate) fn new(of: &Proportions) -> Self {
         let h = of.height;
         let leg = of.legs;
@@ -178,8 +178,8 @@ impl Bones {
         soles.chain(joints).fold(f64::INFINITY, f64::min)
     }
 
-    /// Tip of the nose, left and right heel, left and right big toe. They are placed as by annotators of feet: on the skin or shoe, at
-    /// half the height of the toes.
+    /// Returns the tip of the nose, the left and right heel, and the left and right big toe. They are placed as human annotators do: on the
+    /// skin or shoe, at half the height of the toes.
     pub(crate) fn extras(&self, frames: &[Isometry3<f64>; N_BONES]) -> [Point3<f64>; N_EXTRAS] {
         let at = |bone: usize, place: Vector3<f64>| frames[bone] * Point3::from(place);
         let [toe, heel] = self.sole;

@@ -12,26 +12,26 @@ use crate::subject::Subject;
 use crate::truth::N_JOINTS;
 use crate::wear::Wear;
 
-/// Range of distances from the middle of the stage, in metres: outside the path of a person who walks there.
+/// Range of distances of standing people from the middle of the stage, in metres; it is outside the path of a person who walks there.
 const AWAY_M: [f64; 2] = [1.7, 2.1];
 
-/// Range of distances of a passer's path centre from the middle of the stage, around which the subject walks, in metres.
+/// Range of distances, in metres, between the middle of the stage, around which the subject walks, and the centre of a passer's path.
 const BESIDE_M: [f64; 2] = [0.4, 0.9];
-/// Minimum distance between the trunks of people who pass each other, if a path with this distance is found, in metres.
+/// Minimum distance between the trunks of people who pass each other, in metres. It may be smaller if no such path is found.
 const NEAREST_M: f64 = 0.6;
-/// Number of paths that are tried, and the duration and the interval of their check, in seconds.
+/// Number of random paths that are tried for a passer; the next constants are the duration and the interval of the check, in seconds.
 const N_WAYS: u64 = 60;
 const WATCHED_S: f64 = 20.0;
 const WATCHED_EVERY_S: f64 = 0.2;
 
-/// Another person: one who stands still and gestures, or one who walks.
+/// Another person, who either stands still and gestures, or walks.
 #[derive(Debug)]
 pub(crate) struct Bystander {
     pub(crate) figure: Figure,
     way: Way,
 }
 
-/// Motion of a person, and its place on the stage.
+/// Motion of a person, and the person's position on the stage.
 #[derive(Debug)]
 struct Way {
     motion: Box<Motion>,
@@ -45,7 +45,7 @@ impl Way {
         frames.map(|frame| self.on_stage * frame)
     }
 
-    /// Creates a person who walks around a place beside the middle.
+    /// Creates a person who walks around a point beside the middle of the stage.
     fn walking(subject: &Subject, mut random: Random) -> Self {
         let bearing = random.range(0.0, core::f64::consts::TAU);
         let away = random.range(BESIDE_M[0], BESIDE_M[1]);
@@ -77,10 +77,10 @@ impl Bystander {
         Self::new(&subject, way)
     }
 
-    /// Creates a person who walks and passes the others.
+    /// Creates a person who walks past the others.
     ///
     /// * `number`: index among the passers of the scene.
-    /// * `trunks`: returns the trunk positions of the others at a time, in metres on the stage.
+    /// * `trunks`: function that returns the trunk positions of the others at a time, in metres on the stage.
     pub(crate) fn passing(
         settings: &Settings,
         number: u64,

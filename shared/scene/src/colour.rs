@@ -1,4 +1,4 @@
-//! Colours: computed as linear light, written with the sRGB transfer curve.
+//! Colours: computed as linear light, and converted to sRGB for output.
 
 use nalgebra::Vector3;
 
@@ -17,13 +17,13 @@ pub(crate) fn srgb(bytes: [u8; 3]) -> Linear {
     }))
 }
 
-/// Table that converts linear light to sRGB bytes, exact to one grey level (see the test).
+/// Table that converts linear light to sRGB bytes, with an error of at most one grey level (checked by a test).
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
     table: Vec<u8>,
 }
 
-/// Number of entries of the table. The index is the square root of the light, which spreads the dark values.
+/// Number of entries of the table. The index is the square root of the light, so that dark values get more entries.
 const N_ENTRIES: usize = 4096;
 
 impl Curve {

@@ -9,9 +9,9 @@ use crate::random::{Random, noise};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Pattern {
     Plain,
-    /// Stripes around the body; number per metre.
+    /// Stripes around the body, with their number per metre.
     Stripes(f32),
-    /// Stripes along the body; number per metre.
+    /// Stripes along the body, with their number per metre.
     Bars(f32),
     Checks(f32),
     /// A mixture of threads of two colours.
@@ -22,7 +22,7 @@ pub(crate) enum Pattern {
 }
 
 impl Pattern {
-    /// The patterns to choose from for tops; plain ones are more frequent.
+    /// The patterns for tops, from which one is chosen; plain patterns are listed more often.
     pub(crate) const ON_TOPS: &'static [Self] = &[
         Self::Plain,
         Self::Plain,
@@ -52,7 +52,7 @@ pub(crate) struct Fabric {
     colour: Linear,
     second: Linear,
     pattern: Pattern,
-    /// Strength with which folds change the normal.
+    /// Strength of the effect of folds on the surface normal.
     folds: f32,
     seed: u32,
 }
@@ -122,7 +122,7 @@ impl Fabric {
         (self.colour + (self.second - self.colour) * second) * worn
     }
 
-    /// Returns the contribution of folds to the normal, in the frame of the body at rest.
+    /// Returns what the folds add to the normal, in the frame of the body at rest.
     pub(crate) fn folds(&self, place: &Vector3<f32>) -> Vector3<f32> {
         // Folds run across limbs more than along them.
         let at = Vector3::new(place.x * 13.0, place.y * 13.0, place.z * 22.0);

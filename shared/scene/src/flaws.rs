@@ -1,4 +1,4 @@
-//! Flaws of cameras: noise, blur, exposure, clock offsets, dropped frames, calibration errors. There are none by default.
+//! Flaws of cameras: noise, blur, exposure, clock offsets, dropped frames, calibration errors. All are 0 by default.
 
 use footage::Size;
 use geometry::{Camera, Rig, RigError};
@@ -20,9 +20,9 @@ pub struct Flaws {
     pub desync_s: f64,
     /// Probability that a camera drops a frame.
     pub drop: f64,
-    /// Angle by which every camera is rotated in the written rig, about a random axis, in degrees.
+    /// Angle by which every camera is rotated in the rig file that is written, about a random axis, in degrees.
     pub calibration_degrees: f64,
-    /// Distance by which every camera is moved in the written rig, in a random direction, in millimetres.
+    /// Distance by which every camera is moved in the rig file that is written, in a random direction, in millimetres.
     pub calibration_mm: f64,
 }
 
@@ -41,7 +41,7 @@ pub struct FlawError {
 }
 
 impl Flaws {
-    /// Names of the flaws in settings, in the order of the fields.
+    /// Names of the flaws as used in settings, in the order of the fields.
     pub const NAMES: [&'static str; 7] = [
         "noise",
         "blur",
@@ -108,7 +108,7 @@ impl Flaws {
         self.desync_s * random.fork("desync").nth(camera as u64).range(-1.0, 1.0)
     }
 
-    /// Applies the calibration error to a rig.
+    /// Applies the calibration error to the rig that is written.
     pub(crate) fn written(&self, rig: &Rig, random: Random) -> Result<Rig, RigError> {
         let wrong = |(nth, camera): (usize, &Camera)| {
             let mut random = random.fork("calibration").nth(nth as u64);

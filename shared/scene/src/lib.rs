@@ -1,21 +1,20 @@
 //! Synthetic scenes: rendered people in rendered rooms, seen by calibrated cameras, with the true joint positions.
 //!
-//! [`Settings`] define a scene completely: the cameras, the number of the subject, the action, the seed, and the flaws of the
-//! cameras. A [`Scene`] is created from them. A [`View`] of the scene renders the pictures of one camera and the ground truth
-//! of each picture ([`truth`]). An [`Address`] describes one camera of a scene in one line, `synth://...`, for a process that
-//! shows one camera live. The same settings give bit-identical pictures, regardless of the order and the process in which they are
-//! rendered.
+//! [`Settings`] define a scene completely: the cameras, the number of the subject, the action, the seed, and the flaws of the cameras. A
+//! [`Scene`] is created from these settings. A [`View`] of the scene renders the pictures of one camera and the ground truth of each
+//! picture ([`truth`]). An [`Address`] describes one camera of a scene in one line, `synth://...`, for a process that renders one camera
+//! live. The same settings give bit-identical pictures, regardless of the order and the process in which they are rendered.
 //!
-//! The *stage* is the place where the person acts, and its frame of reference: origin on the floor, z up.
+//! The *stage* is the area in which the person acts. It also means the frame of reference there: origin on the floor, z up.
 //!
 //! # How it works
 //!
-//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton. The surface is created once and follows the
-//! bones. Every corner of its small triangles is projected by the camera itself, including distortion. A z-buffer with four samples per
-//! pixel determines the visible surface. The room is rendered by casting rays through the same camera; it does not move, so this is done
-//! once per camera. One lamp casts soft shadows.
+//! A person is a union of some forty smooth solids on the bones of an anatomical skeleton. The surface is created once, as small triangles,
+//! and follows the bones. Every corner of the triangles is projected with the camera's full model, including distortion. A z-buffer with
+//! four samples per pixel determines the visible surface. The room is rendered by casting rays through the same camera; it does not move,
+//! so this is done once per camera. One lamp casts soft shadows.
 //!
-//! Published software renderers (`euc`, `retrofire`) do not support lens distortion and are larger than `raster`.
+//! The module `raster` is used because published software renderers (`euc`, `retrofire`) do not support lens distortion and are larger.
 #![forbid(unsafe_code)]
 
 mod colour;

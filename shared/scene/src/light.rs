@@ -8,12 +8,12 @@ use crate::random::Random;
 /// The light of a room, in the frame of the stage, z up.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Light {
-    /// Unit vector to the key lamp, which casts shadows and whose rays are parallel.
+    /// Unit vector to the key lamp, which casts the shadows. Its rays are parallel.
     pub(crate) to_key: Vector3<f32>,
     pub(crate) key: Linear,
     to_fill: Vector3<f32>,
     fill: Linear,
-    /// Ambient light from above and from below.
+    /// Ambient light that comes from above; the next field is the light from below.
     sky: Linear,
     ground: Linear,
     /// Two axes perpendicular to the rays of the key lamp.
@@ -47,14 +47,14 @@ impl Light {
         }
     }
 
-    /// Returns the light on a surface with that normal, without the key lamp.
+    /// Returns the light on a surface with the given normal, without the key lamp.
     pub(crate) fn around(&self, normal: &Vector3<f32>) -> Linear {
         let up = 0.5 + 0.5 * normal.z;
         let fill = normal.dot(&self.to_fill).max(0.0);
         self.ground + (self.sky - self.ground) * up + self.fill * fill
     }
 
-    /// Returns the light of the key lamp on a surface with that normal, if it is not in shadow.
+    /// Returns the light of the key lamp on a surface with the given normal that is not in shadow.
     pub(crate) fn direct(&self, normal: &Vector3<f32>) -> Linear {
         self.key * normal.dot(&self.to_key).max(0.0)
     }

@@ -10,7 +10,7 @@ use crate::shape::{BodyShape, FAR, Grid};
 /// Spacing of the lattice on which the surface is created, in metres.
 const STEP: f32 = 0.012;
 
-/// A point follows two bones if their distances differ by less than about this, in metres.
+/// Difference in distance, in metres, up to which a point follows both of two bones.
 const SHARED: f32 = 0.02;
 
 /// Maximum number of bones that a point follows.
@@ -21,9 +21,9 @@ const N_WEIGHTS: usize = 4;
 pub(crate) struct Mesh {
     pub(crate) points: Vec<Point3<f32>>,
     pub(crate) normals: Vec<Vector3<f32>>,
-    /// Triangles, anticlockwise as seen from outside.
+    /// Triangles, with their corners anticlockwise as seen from outside.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Bones and their weights, which sum to 1.
+    /// The bones that each point follows and their weights, which sum to 1.
     weights: Vec<[(u8, f32); N_WEIGHTS]>,
     rest_from_body: [Isometry3<f64>; N_BONES],
 }
@@ -41,7 +41,7 @@ impl Mesh {
         shape.fill(&mut grid);
         let (mut points, triangles) = nets::surface(&grid);
         for point in &mut points {
-            // Newton steps move the points onto the surface, which the lattice has smoothed.
+            // The grid has smoothed the surface; Newton steps move the points back onto it.
             for _ in 0..2 {
                 let off = shape.distance(point).clamp(-STEP, STEP);
                 *point -= shape.normal(point) * off;
@@ -97,7 +97,7 @@ impl Mesh {
     }
 }
 
-/// Returns the bones that a point follows: those whose solids contain it, blended if two are equally near.
+/// Returns the bones that a point follows: those whose solids contain it, with blended weights if two are equally near.
 fn weights(shape: &BodyShape, at: &Point3<f32>) -> [(u8, f32); N_WEIGHTS] {
     let mut distances = shape.by_bone(at);
     // A point of one leg never follows the other leg.

@@ -19,9 +19,9 @@ pub enum Action {
     Walking,
     /// Jogging around the middle of the room.
     Jogging,
-    /// Guard, straight punches, hooks and uppercuts.
+    /// Punches, hooks and uppercuts from a boxer's guard.
     Boxing,
-    /// Waving, pointing, beckoning, arms crossed, hands on hips.
+    /// Waving, pointing, beckoning, crossing the arms, hands on hips.
     Gestures,
     /// Throwing a ball and catching it.
     ThrowCatch,
@@ -29,7 +29,7 @@ pub enum Action {
     Chair,
     /// Picking things up and putting them on a shelf.
     Grab,
-    /// Leaning: on a table, on the own knees, or against a pillar.
+    /// Leaning on a table, on one's own knees, or against a pillar.
     Lean,
     /// Working at a table.
     Table,
@@ -89,7 +89,7 @@ struct Actor {
     random: Random,
     /// Initial direction that the person faces, in radians from x to y.
     heading: f64,
-    /// Place of the person, or the centre of the path, in metres.
+    /// Position of the person, or centre of the person's path, in metres.
     place: [f64; 2],
 }
 
@@ -135,7 +135,7 @@ impl Motion {
         keys::furniture(self, self.action)
     }
 
-    /// Moves the person's lowest point to the floor, and the feet (or the pelvis) to their place.
+    /// Moves the person so that the lowest point is on the floor, and the feet (or the pelvis) are at their position.
     fn grounded(&self, stance: &Stance) -> Pose {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), stance.heading)
             * UnitQuaternion::from_euler_angles(stance.roll.to_radians(), 0.0, 0.0)
@@ -160,7 +160,7 @@ impl Motion {
 }
 
 impl Stance {
-    /// Adds slow sway to every joint, and lifts the collars with the arms.
+    /// Adds a slow sway to every joint, and raises the collar bones with the arms.
     fn sway(&mut self, actor: &Actor, seconds: f64) {
         for (bone, angles) in self.angles.iter_mut().enumerate() {
             for (axis, angle) in angles.iter_mut().enumerate() {

@@ -32,11 +32,11 @@ pub(crate) struct Painter {
     eye: Vector3<f32>,
 }
 
-/// A posed body. Triangles and corners of all bodies are numbered consecutively.
+/// A posed body. Triangles and corners are numbered consecutively over all bodies.
 #[derive(Debug, Clone)]
 struct Body {
     posed: Posed,
-    /// For every bone, the rotation of directions from the rest pose.
+    /// For every bone, the rotation from the rest pose to this pose, for directions.
     turns: [Matrix3<f32>; N_BONES],
     first_triangle: usize,
     first_corner: usize,
@@ -82,7 +82,7 @@ impl Painter {
         }
     }
 
-    /// Determines the person seen by every sample, if any.
+    /// Finds the person, if any, that is visible at every sample.
     pub(crate) fn draw(&mut self, of: &Input<'_>) {
         let camera = of.camera;
         self.eye = camera.centre_in_world().coords.cast();
@@ -139,14 +139,14 @@ impl Painter {
         }
     }
 
-    /// Returns true if a sample sees the subject.
+    /// Returns true if the subject is visible at a sample.
     pub(crate) fn sees_subject(&self, sample: usize) -> bool {
         let end = self.bodies.get(1).map_or(usize::MAX, |body| body.first_triangle);
         let triangle = self.samples.triangle[sample];
         triangle != NOTHING && (triangle as usize) < end
     }
 
-    /// Returns the number of samples that see each person, the subject first, after [`draw`](Self::draw).
+    /// Returns the number of samples at which each person is visible, the subject first, after [`draw`](Self::draw).
     pub(crate) fn seen(&self) -> Vec<usize> {
         let mut seen = vec![0; self.bodies.len()];
         for triangle in self.samples.triangle.iter().filter(|nearest| **nearest != NOTHING) {
@@ -174,7 +174,7 @@ impl Painter {
         (0..SUB * SUB).map(move |sub| (y * SUB + sub / SUB) * width + x * SUB + sub % SUB)
     }
 
-    /// Returns the mean of the samples of a pixel, if any of them sees a person.
+    /// Returns the colour of a pixel as the mean of its samples; `None` if no person is visible in it.
     fn pixel(&self, of: &Input<'_>, x: usize, y: usize) -> Option<Linear> {
         let n = self.of_pixel(x, y).filter(|i| self.samples.triangle[*i] != NOTHING).count();
         if n == 0 {
@@ -195,7 +195,7 @@ impl Painter {
         Some((sum + behind * (all - n as f32)) / all)
     }
 
-    /// Returns the light reflected to the camera by a place of the body.
+    /// Returns the light that a point of the body reflects to the camera.
     fn shade(&self, of: &Input<'_>, triangle: usize, place: Point2<f32>) -> Linear {
         let after = self.bodies.partition_point(|body| body.first_triangle <= triangle);
         let body = &self.bodies[after - 1];
@@ -223,7 +223,7 @@ impl Painter {
         let half = to_eye.try_normalize(1e-6).unwrap_or(Vector3::z()) + of.light.to_key;
         let mirrored = half.try_normalize(1e-6).map_or(0.0, |half| half.dot(&normal).max(0.0));
         let shine = finish.gloss * mirrored.powi(24) * 4.0 * (1.0 - dark);
-        // Places near the floor are darker.
+        // Points near the floor are darker.
         let low = 1.0 - 0.35 * (-(at.z.max(0.0)) / 0.25).exp();
         finish.colour.component_mul(&(of.light.around(&normal) * low + key)) + of.light.key * shine
     }

@@ -1,4 +1,4 @@
-//! Performance of the person of a scene: a generated action, or a recording.
+//! The motion of the person of a scene: a generated action or a recording.
 
 use nalgebra::Isometry3;
 
@@ -13,7 +13,7 @@ pub(crate) struct Performance {
     pub(crate) bones: Bones,
     /// Standing height of the person, in metres.
     pub(crate) height: f64,
-    /// Name of the action in the ground truth.
+    /// Name of the action as written to the ground truth.
     pub(crate) name: String,
     pub(crate) course: Course,
 }
@@ -34,7 +34,7 @@ impl Performance {
         }
     }
 
-    /// Chairs, tables and mats that the action needs; none for a recording, where they are unknown.
+    /// Returns the chairs, tables and mats that the action needs; empty for a recording, because they are unknown.
     pub(crate) fn furniture(&self) -> Vec<Block> {
         match &self.course {
             Course::Acted(motion) => motion.furniture(),

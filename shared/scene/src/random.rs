@@ -19,7 +19,7 @@ impl Random {
         Self(mix(seed.wrapping_add(GOLDEN)))
     }
 
-    /// Returns another generator for a separate purpose, so that an additional draw here changes nothing there.
+    /// Returns another generator for a separate purpose, so that an additional draw from one of them does not change the other.
     pub(crate) fn fork(self, purpose: &str) -> Self {
         Self(mix(self.0 ^ formats::checksum::fnv1a(purpose.as_bytes())))
     }
@@ -44,7 +44,7 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// Draws a number with mean 0 and standard deviation 1, never beyond 3.5 (sum of twelve uniform numbers, clipped).
+    /// Draws a number with mean 0 and standard deviation 1: the sum of twelve uniform numbers, limited to 3.5 in either direction.
     pub(crate) fn normal(&mut self) -> f64 {
         let sum: f64 = (0..12).map(|_| self.unit()).sum();
         (sum - 6.0).clamp(-3.5, 3.5)

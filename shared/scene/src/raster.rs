@@ -8,7 +8,7 @@ use nalgebra::{Point2, Point3, Vector3};
 /// Number of samples along the side of a pixel.
 pub(crate) const SUB: usize = 2;
 
-/// A projected corner: position in pixels, and 1 / depth; 1 / depth is 0 if the corner is behind the camera.
+/// A projected corner: its position in pixels, and 1 / depth, which is 0 if the corner is behind the camera.
 pub(crate) type Corner = Vector3<f32>;
 
 /// Index that means no triangle.
@@ -23,7 +23,7 @@ pub(crate) struct Samples {
     /// 1 / depth of the nearest surface, in 1 / metres.
     pub(crate) near: Vec<f32>,
     pub(crate) triangle: Vec<u32>,
-    /// Columns and rows of the samples touched by triangles: `[x1, y1, x2, y2]`, the last excluded.
+    /// Range of columns and rows of the samples covered by triangles: `[x1, y1, x2, y2]`, where x2 and y2 are excluded.
     pub(crate) touched: [usize; 4],
 }
 
@@ -94,10 +94,10 @@ impl Samples {
     }
 }
 
-/// Samples on an edge belong to both sides, so that rounding leaves no gaps.
+/// Tolerance at edges: samples on an edge belong to both triangles, so that rounding leaves no gaps.
 const EDGE: f32 = 1e-5;
 
-/// Returns the weights of the corners at a place in the picture, corrected for depth; they sum to 1.
+/// Returns the weights of the corners at a point of the picture, corrected for depth; they sum to 1.
 pub(crate) fn shares(corners: [&Corner; 3], at: Point2<f32>) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| Point2::new(corner.x, corner.y));
     let area = (b - a).perp(&(c - a));

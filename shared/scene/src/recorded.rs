@@ -14,18 +14,18 @@ use crate::truth::N_JOINTS;
 pub struct Recording {
     /// Name of the recording, used instead of the name of an action.
     pub name: String,
-    /// Number of postures per second.
+    /// Number of recorded postures per second.
     pub rate_hz: f64,
     /// The postures; at least one.
     pub postures: Vec<Posture>,
 }
 
-/// Joint positions at one time, in metres, z up.
+/// Positions of the joints at one time, in metres, z up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Posture {
     /// The joints of `skeleton::PARSE14`.
     pub joints: [[f64; 3]; N_JOINTS],
-    /// The toes of the right and of the left foot, if known; without them, feet follow the shins.
+    /// The toes of the right and of the left foot, if known; if unknown, the feet point as the shins determine.
     pub toes: Option<[[f64; 3]; 2]>,
 }
 
@@ -53,7 +53,7 @@ impl Recording {
     }
 }
 
-/// Indices of the joints of `skeleton::PARSE14`, left first.
+/// Indices of hips in `skeleton::PARSE14`, left first.
 const HIPS: [usize; 2] = [3, 2];
 const KNEES: [usize; 2] = [4, 1];
 const ANKLES: [usize; 2] = [5, 0];
@@ -63,20 +63,19 @@ const WRISTS: [usize; 2] = [11, 6];
 const NECK_JOINT: usize = 12;
 const HEAD_JOINT: usize = 13;
 
-/// Share of the postures whose lowest point may be below the floor, because recordings are not exact.
+/// Fraction of the postures whose lowest point may be below the floor; it is not 0 because recordings are inaccurate.
 const BELOW_FLOOR: f64 = 0.05;
 
 /// A recording transferred to a subject, with the bone directions of the recording and the bone lengths of the subject.
 ///
-/// The path is scaled like the legs, moved to the middle of the room, and put on the floor. Joint limits are
-/// not applied.
+/// The path is scaled in proportion to the legs, moved to the middle of the room, and placed on the floor. Joint limits are not applied.
 #[derive(Debug, Clone)]
 pub(crate) struct Recorded {
     recording: Recording,
     bones: Bones,
-    /// Lengths of the subject relative to those of the recorded person.
+    /// Ratio of the subject's size to that of the recorded person.
     scale: f64,
-    /// Vector from the scaled recording to the stage.
+    /// Vector that moves the scaled recording to the stage.
     shift: Vector3<f64>,
 }
 
@@ -165,7 +164,7 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
     for side in [LEFT, RIGHT] {
         turns[COLLAR[side]] = turns[CHEST];
         let arm = [SHOULDERS, ELBOWS, WRISTS].map(|pair| joint(pair[side]));
-        // Elbows fold forward, and knees backward.
+        // The forearm bends forward, and the shin bends backward.
         let [upper, fore] = hinged(&turns[CHEST], arm, -1.0);
         turns[UPPER_ARM[side]] = upper;
         turns[FOREARM[side]] = fore;
@@ -187,9 +186,9 @@ fn turns(bones: &Bones, posture: &Posture) -> [UnitQuaternion<f64>; N_BONES] {
 
 /// Returns the rotations of the two bones of a limb, which hang down at rest, from the positions of its three joints.
 ///
-/// The axis of the hinge between them follows from the bend; for a straight limb, the axis of the trunk is used.
+/// The axis of the hinge between the two bones is computed from the bend; for a straight limb, the axis of the trunk is used.
 ///
-/// * `fold`: 1 if the hinge folds backward, -1 if forward.
+/// * `fold`: 1 if the limb bends backward, -1 if it bends forward.
 fn hinged(
     trunk: &UnitQuaternion<f64>,
     [top, middle, end]: [Vector3<f64>; 3],
@@ -202,7 +201,7 @@ fn hinged(
         .unwrap_or_else(UnitQuaternion::identity);
     let straight = carried * (trunk * Vector3::y());
     let bend = fold * upper.cross(&lower);
-    // The axis is blended from 9 to 27 degrees of bend.
+    // Between 9 and 27 degrees of bend, the two axes are blended.
     let share = ((bend.norm() - 0.15) / 0.3).clamp(0.0, 1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let axis = straight * (1.0 - share) + unit(bend, straight) * share;

@@ -11,11 +11,11 @@ use nalgebra::{
 /// The choice of the cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RigChoice {
-    /// The three colour cameras of HumanEva-I in their positions for subject S1, 640x480.
+    /// The three colour cameras of HumanEva-I, in their positions for subject S1; 640x480.
     HumanEva,
-    /// The four cameras of UMPM, 644x486.
+    /// The four cameras of UMPM; 644x486.
     Umpm,
-    /// `n` cameras of 640x480 evenly around the stage.
+    /// `n` cameras of 640x480, spaced evenly around the stage.
     Ring {
         /// Number of cameras.
         n: usize,
@@ -31,7 +31,7 @@ pub enum RigChoice {
 /// Reason why a rig could not be created.
 #[derive(Debug, thiserror::Error)]
 pub enum RigChoiceError {
-    /// The text has none of the known forms.
+    /// The text has none of the accepted forms.
     #[error(
         "{text:?} is not a rig: expected humaneva, umpm, ring:N[:RADIUS[:HEIGHT]] or a rig file"
     )]
@@ -39,7 +39,7 @@ pub enum RigChoiceError {
         /// The given text.
         text: String,
     },
-    /// The file of a preset cannot be read.
+    /// The file of a built-in rig cannot be read.
     #[error("a preset cannot be read")]
     Preset(#[from] ParseError),
     /// The rig file cannot be read.
@@ -48,7 +48,7 @@ pub enum RigChoiceError {
     /// The cameras do not form a valid rig.
     #[error("the cameras do not form a valid rig")]
     Rig(#[from] RigError),
-    /// The rig has no up direction, so the floor is unknown.
+    /// The rig has no up direction, so the position of the floor is unknown.
     #[error("the rig has no up direction")]
     NoUp,
 }
@@ -137,7 +137,7 @@ const UMPM_FOCUS: f64 = 0.95;
 
 /// Returns the cameras of UMPM, rotated so that z is up and the floor is at 0.
 ///
-/// Their calibration has no up direction, so the image rows are assumed to be level.
+/// The calibration of these cameras has no up direction, so the rows of the pictures are assumed to be horizontal.
 fn umpm() -> Result<Rig, RigChoiceError> {
     let text = include_str!("../../../configs/rigs/umpm-triangle.toml");
     let rig = geometry::files::own::parse(text, &ReadOptions::default())?;
@@ -179,7 +179,7 @@ fn upright(up: &UnitVector3<f64>) -> UnitQuaternion<f64> {
     })
 }
 
-/// Cameras `c1`, `c2`, ... evenly around the origin, looking at a point 0.9 m above the floor.
+/// Creates cameras `c1`, `c2`, ..., spaced evenly around the origin, that look at a point 0.9 m above the floor.
 fn ring(n: usize, radius: f64, height: f64) -> Result<Rig, RigError> {
     let target = Point3::new(0.0, 0.0, 0.9);
     let camera = |nth: usize| {
@@ -227,8 +227,8 @@ impl OrX for Vector3<f64> {
 
 /// Returns the pose of the stage: the frame with its origin on the floor, z up.
 ///
-/// The floor is at 0 if the world's z is up and the focus of the cameras is at most 2 m above 0. Otherwise, it is
-/// 0.95 m below the focus.
+/// The floor is at height 0 if the world's z axis points up and the point at which the cameras look is at most 2 m above 0. Otherwise, the
+/// floor is 0.95 m below that point.
 ///
 /// # Errors
 ///
@@ -321,7 +321,7 @@ mod tests {
     }
 
     proptest! {
-        /// The strategy generates only valid texts, so that the assertion is reached.
+        /// The strategy generates only valid texts, because otherwise the assertion would not be reached.
         #[test]
         fn a_parsed_choice_is_written_and_parsed_to_the_same(
             text in "humaneva|umpm|ring:[1-9](:[2-9](\\.[0-9]{1,6})?(:[1-9](\\.[0-9]{1,6})?)?)?|\\PC{0,9}[./]\\PC{0,9}",

@@ -50,26 +50,26 @@ impl Block {
 /// A flat object on a wall.
 #[derive(Debug, Clone, Copy)]
 struct Panel {
-    /// Centre and half of the size, along the wall and up, in metres.
+    /// Centre and half size, along the wall and upwards, in metres.
     middle: [f32; 2],
     half: [f32; 2],
     material: Material,
 }
 
-/// Walls in a rectangle around the stage.
+/// The walls, which form a rectangle around the stage.
 #[derive(Debug, Clone)]
 pub(crate) struct Room {
     low: Vector3<f32>,
     high: Vector3<f32>,
     floor: Material,
     wall: Material,
-    /// Panels of the walls at -x, +x, -y, +y.
+    /// Flat objects on the walls at -x, +x, -y, +y.
     panels: [Vec<Panel>; 4],
     blocks: Vec<Block>,
     pub(crate) light: Light,
 }
 
-/// The end of a ray.
+/// The point at which a ray ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Hit {
     /// Distance along the ray, in lengths of its direction vector.
@@ -79,7 +79,7 @@ pub(crate) struct Hit {
     pub(crate) colour: Linear,
     /// True if the surface emits light and is not affected by the lamps.
     pub(crate) shines: bool,
-    /// Share of the ambient light that is blocked by corners.
+    /// Fraction of the ambient light that nearby corners of the room block.
     pub(crate) dim: f32,
 }
 
@@ -87,7 +87,7 @@ impl Room {
     /// Creates a random room that contains the cameras.
     ///
     /// * `cameras`: positions of the cameras; no random furniture is placed between them and the stage.
-    /// * `furniture`: furniture of the action, at its place.
+    /// * `furniture`: furniture that the action needs, already in position.
     pub(crate) fn new(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Self {
         furnish::room(random, cameras, furniture)
     }
@@ -180,7 +180,8 @@ impl Room {
 }
 
 impl Block {
-    /// Returns where a ray from outside enters: the distance along the ray, the normal, and the place in the block's own frame.
+    /// Returns where a ray from outside enters the block: the distance along the ray, the normal, and the position in the block's own
+    /// frame.
     fn enter(
         &self,
         from: &Point3<f32>,

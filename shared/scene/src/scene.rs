@@ -59,8 +59,8 @@ pub struct Scene {
     random: Random,
 }
 
-/// Thickness of the body around a joint. A surface that is nearer to the camera by more than this occludes the joint. In metres for a
-/// person of 1.75 m, in the order of `skeleton::PARSE14`.
+/// Thickness of the body around each joint, in metres for a person of 1.75 m, in the order of `skeleton::PARSE14`. A surface that is nearer
+/// to the camera than the joint by more than this thickness hides the joint.
 const TISSUE: [f64; N_JOINTS] = [
     0.07, 0.085, 0.16, 0.16, 0.085, 0.07, 0.055, 0.07, 0.10, 0.10, 0.07, 0.055, 0.10, 0.13,
 ];
@@ -83,8 +83,8 @@ impl Scene {
         Self::build(settings, &subject, performance)
     }
 
-    /// Creates a scene from a recording. The subject repeats the recorded motion in the middle of the room, scaled to the
-    /// subject's size. The action of the settings is ignored.
+    /// Creates a scene from a recording. In the middle of the room, the subject repeats the recorded motion, scaled to the subject's size.
+    /// The action of the settings is ignored.
     ///
     /// # Errors
     ///
@@ -92,7 +92,7 @@ impl Scene {
     ///
     /// # Panics
     ///
-    /// If there is no posture.
+    /// If the recording has no postures.
     pub fn of_recording(settings: &Settings, recording: &Recording) -> Result<Self, SceneError> {
         assert!(!recording.postures.is_empty(), "a recording of nothing");
         let subject = Subject::new(settings.subject);
@@ -155,7 +155,7 @@ impl Scene {
         &self.rig
     }
 
-    /// Returns the cameras with the requested calibration error.
+    /// Returns the cameras as they are written to the rig file, with the requested calibration error.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Scene {
         self.settings.flaws.written(&self.rig, self.random)
     }
 
-    /// Returns the first line of the truth.
+    /// Returns the first line of the file of ground truth.
     pub fn header(&self) -> Header {
         let up = self.world_from_stage.rotation * Vector3::z();
         Header {
@@ -225,7 +225,7 @@ impl Scene {
     }
 }
 
-/// Returns the other people: those who stand, then those who pass.
+/// Returns the other people: first those who stand, then those who walk past.
 fn others(settings: &Settings, performance: &Performance) -> Vec<Bystander> {
     let standing = 0..settings.others;
     let mut others: Vec<Bystander> =
@@ -258,8 +258,8 @@ pub fn camera_of(rig: &Rig, name: &str) -> Result<usize, SceneError> {
     })
 }
 
-/// Returns the time from the instants of the frames to the pictures of an address's camera, in milliseconds; 0 for a camera that the rig
-/// does not have.
+/// Returns the time from the instants of the frames to the pictures of the camera in an address, in milliseconds; 0 if the rig has no such
+/// camera.
 pub fn skew_ms_of(address: &Address) -> f64 {
     let Settings { rig, skews_ms, .. } = &address.settings;
     let rig = (!skews_ms.is_empty()).then(|| rig.rig().ok()).flatten();
@@ -269,7 +269,7 @@ pub fn skew_ms_of(address: &Address) -> f64 {
 
 /// One camera of a scene; renders its pictures in its own buffers.
 ///
-/// Cloning is cheap except for these buffers: the background is shared.
+/// Cloning copies these buffers, but not the background, which is shared.
 #[derive(Debug, Clone)]
 pub struct View {
     scene: Arc<Scene>,
@@ -352,14 +352,14 @@ impl View {
         mask
     }
 
-    /// Returns the visible area of each person in the last picture, in pixels: the subject first, then the others in the order of
+    /// Returns the visible area of each person in the last picture, in pixels. The subject comes first, then the others in the order of
     /// [`Scene::other_joints`].
     pub fn seen_px(&self) -> Vec<f64> {
         let samples = self.painter.seen().into_iter();
         samples.map(|n| n as f64 / (SUB * SUB) as f64).collect()
     }
 
-    /// Determines the visible parts of the people, and writes the picture if requested; returns the bones of the subject.
+    /// Finds the visible parts of the people, and renders the picture if requested; returns the bones of the subject.
     fn draw(&mut self, seconds: f64, rgb: Option<&mut [u8]>) -> [Isometry3<f64>; N_BONES] {
         let scene = &self.scene;
         let frames = scene.performance.frames(seconds);
@@ -418,7 +418,7 @@ impl View {
         }
     }
 
-    /// Returns true if nothing occludes a joint except the body around it.
+    /// Returns true if nothing except the body around a joint hides it.
     fn is_visible(&self, joint: usize, at: &Point3<f64>, pixel: Option<[f64; 2]>) -> bool {
         let Some([x, y]) = pixel else { return false };
         let samples = &self.painter.samples;
@@ -434,7 +434,7 @@ impl View {
         in_front < TISSUE[joint] * self.scene.performance.height / 1.75
     }
 
-    /// Returns the bounding box of the samples that see the person, in pixels.
+    /// Returns the bounding box of the samples at which the subject is visible, in pixels.
     fn outline(&self) -> Option<[f64; 4]> {
         let samples = &self.painter.samples;
         let [x1, y1, x2, y2] = samples.touched;

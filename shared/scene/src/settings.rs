@@ -15,9 +15,9 @@ pub struct Settings {
     pub subject: u64,
     /// Action of the subject.
     pub action: Action,
-    /// Number of other people who stand around, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    /// Number of other people who stand near the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub others: u64,
-    /// Number of other people who walk and pass the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
+    /// Number of other people who walk past the subject, at most [`MOST_OTHERS`](Self::MOST_OTHERS).
     pub passers: u64,
     /// Seed of the random choices: the performance, the room, the lamps.
     pub seed: u64,
@@ -27,8 +27,8 @@ pub struct Settings {
     pub backdrop: Option<PathBuf>,
     /// The flaws of the cameras.
     pub flaws: Flaws,
-    /// Time from the instant of a frame to the picture of each camera, in milliseconds, in the order of the rig. Cameras
-    /// without an entry take their pictures at the instant.
+    /// Time from the instant of a frame to the picture of each camera, in milliseconds, in the order of the rig. Cameras without an entry
+    /// take their pictures exactly at the instant.
     pub skews_ms: Vec<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// Subject 1 walks in front of the cameras of HumanEva, 30 frames per second, no flaws.
+    /// Returns the settings for subject 1 walking in front of the cameras of HumanEva, at 30 frames per second, without flaws.
     fn default() -> Self {
         Self {
             rig: RigChoice::HumanEva,
@@ -81,10 +81,10 @@ pub enum AddressError {
         /// The unknown key.
         key: String,
     },
-    /// A key has no `=`, or occurs twice.
+    /// A part of the address has no `=`, or its key occurs twice.
     #[error("{text:?} is not key=value, or repeats a key")]
     Pair {
-        /// Text of the pair.
+        /// Text of this part.
         text: String,
     },
     /// A value is invalid.
@@ -100,12 +100,12 @@ pub enum AddressError {
     /// A flaw is invalid.
     #[error("a flaw of the address is not valid")]
     Flaw(#[from] FlawError),
-    /// The address does not name a camera.
+    /// The address does not contain a camera.
     #[error("the address names no camera: add camera=NAME or camera=0, 1, ...")]
     NoCamera,
 }
 
-/// One camera of a scene in one line: `synth://RIG?key=value&key=value`.
+/// One camera of a scene, described in one line: `synth://RIG?key=value&key=value`.
 ///
 /// ```
 /// let it = scene::Address::parse("synth://humaneva?action=walking&subject=3&seed=1&camera=C1")?;
@@ -126,7 +126,7 @@ pub struct Address {
 const SCHEME: &str = "synth://";
 
 impl Address {
-    /// Keys of an address, with those of the flaws last; `camera` is required.
+    /// Keys of an address, with the keys of the flaws last; `camera` is required.
     pub const KEYS: [&'static str; 17] = [
         "camera",
         "action",
@@ -156,7 +156,7 @@ impl Address {
     ///
     /// # Errors
     ///
-    /// [`AddressError`] for the first error from the left.
+    /// [`AddressError`] for the leftmost error.
     pub fn parse(text: &str) -> Result<Self, AddressError> {
         let rest = text.strip_prefix(SCHEME).ok_or(AddressError::Scheme)?;
         let (rig, query) = rest.split_once('?').unwrap_or((rest, ""));
@@ -332,7 +332,7 @@ mod tests {
         }
     }
 
-    /// Pairs that are valid at any position, unless a key occurs twice.
+    /// Key-value pairs that are valid at any position, unless a key occurs twice.
     fn pair() -> impl Strategy<Value = String> {
         prop_oneof![
             "action=(walking|boxing|throw-catch)",
@@ -347,7 +347,7 @@ mod tests {
     }
 
     proptest! {
-        /// The strategy generates only valid texts, in any spelling, so that the assertion is reached.
+        /// The strategy generates only valid texts, in any spelling, because otherwise the assertion would not be reached.
         #[test]
         fn a_parsed_address_is_written_and_parsed_to_the_same(
             rig in "humaneva|umpm|ring:[1-9](:[2-9](\\.[0-9]{1,3})?)?|[a-z]{1,5}/[a-z]{1,5}\\.toml",

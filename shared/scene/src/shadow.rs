@@ -1,4 +1,4 @@
-//! The shadow of a person: a shadow map of the key lamp.
+//! The shadows of people, as a shadow map of the key lamp.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -20,7 +20,7 @@ pub(crate) struct Shadow {
     low: Vector2<f32>,
     width: usize,
     height: usize,
-    /// Coordinate towards the lamp of the nearest point of a body; minus infinity if there is none.
+    /// Coordinate, towards the lamp, of the nearest point of a body in each cell; minus infinity for an empty cell.
     near: Vec<f32>,
 }
 
@@ -78,9 +78,9 @@ impl Shadow {
         }
     }
 
-    /// Returns the share of the lamp's light that the bodies block at a point, 0 to 1: the mean over a square of cells.
+    /// Returns the fraction of the lamp's light that the bodies block at a point, 0 to 1, averaged over a square of cells.
     ///
-    /// * `reach`: number of cells to every side; more for a larger lamp.
+    /// * `reach`: number of cells on each side of the point; a larger lamp needs more.
     /// * `bias`: minimum distance towards the lamp at which a surface casts a shadow, in metres.
     pub(crate) fn share(&self, across: Vector2<f32>, near: f32, reach: usize, bias: f32) -> f32 {
         let at = (across - self.low) / CELL;
@@ -113,7 +113,7 @@ impl Shadow {
     }
 }
 
-/// Returns the weight of a cell along one axis of the square, which covers its first and last cells only in part.
+/// Returns the weight of a cell along one axis of the square. The first and the last cell are covered only in part.
 fn weight(nth: i64, taps: i64, part: f32) -> f32 {
     match nth {
         0 => 1.0 - part,

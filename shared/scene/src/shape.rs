@@ -19,7 +19,7 @@ pub(crate) struct Piece {
 /// Radius over which solids are blended, in metres.
 const BLEND: f32 = 0.028;
 
-/// A body in the pose in which its surface is created.
+/// A body in the rest pose, in which its surface is created.
 #[derive(Debug, Clone)]
 pub(crate) struct BodyShape {
     pieces: Vec<Piece>,
@@ -28,7 +28,7 @@ pub(crate) struct BodyShape {
     pub(crate) height: f32,
 }
 
-/// Returns the pose in which the surface is created: arms and legs are apart, so that they do not touch.
+/// Returns the pose in which the surface is created. The arms and legs are spread, so that they do not touch.
 pub(crate) fn rest_pose() -> Pose {
     let mut angles: Angles = [[0.0; 3]; N_BONES];
     for side in 0..2 {
@@ -77,7 +77,7 @@ impl BodyShape {
         })
     }
 
-    /// Reduces every distance in a grid of points to the distance from the nearest solid, one solid after the other.
+    /// Reduces every distance in a grid of points to the distance from the nearest solid, adding one solid after the other.
     pub(crate) fn fill(&self, grid: &mut Grid) {
         for piece in &self.pieces {
             let [low, high] = piece.solid.bounds();

@@ -14,7 +14,7 @@ pub(crate) struct Subject {
     pub(crate) girth: f32,
     /// Additional depth of the belly.
     pub(crate) belly: f32,
-    /// Shape of the body: 0 for a man, 1 for a woman.
+    /// Shape of the body, from 0 for a man to 1 for a woman.
     pub(crate) curves: f32,
     pub(crate) skin: Linear,
     pub(crate) hair: Hair,
@@ -39,7 +39,7 @@ pub(crate) struct Hair {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Top {
     pub(crate) fabric: Fabric,
-    /// Covered share of the arm, from the shoulder.
+    /// Fraction of the arm that is covered, from the shoulder.
     pub(crate) sleeve: f32,
     /// Length below the hip joints, in metres; negative if the hem is above them.
     pub(crate) hem: f32,
@@ -51,7 +51,7 @@ pub(crate) struct Top {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bottom {
     pub(crate) fabric: Fabric,
-    /// Covered share of the leg, from the hip.
+    /// Fraction of the leg that is covered, from the hip.
     pub(crate) leg: f32,
     pub(crate) slack: f32,
     pub(crate) is_skirt: bool,

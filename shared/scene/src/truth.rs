@@ -1,4 +1,4 @@
-//! The ground truth of a sequence, as lines of JSON: the joints, and their projections in every camera.
+//! The ground truth of a sequence, as lines of JSON. It contains the joints and their projections in every camera.
 //!
 //! The format is documented in `TRUTH.md` beside this crate.
 
@@ -28,7 +28,7 @@ pub struct Header {
     pub seed: u64,
     /// Number of frames per second.
     pub frame_rate_hz: f64,
-    /// Direction against gravity in the world, as a unit vector.
+    /// Upward direction in the world, as a unit vector.
     pub up: [f64; 3],
     /// Names of the joints.
     pub joints: Vec<String>,
@@ -64,7 +64,7 @@ pub struct View {
     pub repeated: bool,
     /// True if the person's back is turned to the camera.
     pub from_behind: bool,
-    /// The joints in the picture, in pixels, at the time the picture was taken; `None` behind the camera.
+    /// The joints in the picture, in pixels, at the time at which the picture was taken; `None` for a joint behind the camera.
     pub pixels: [Option<[f64; 2]>; N_JOINTS],
     /// For every joint, true if it is visible.
     pub visible: [bool; N_JOINTS],
@@ -76,7 +76,7 @@ pub struct View {
 /// Reason why a line is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum TruthError {
-    /// The line is not JSON, or does not have these keys.
+    /// The line is not JSON, or does not have the required keys.
     #[error("not a line of a truth file")]
     Syntax(#[from] serde_json::Error),
     /// The file has another format or version.
@@ -153,7 +153,7 @@ impl Header {
     ///
     /// # Errors
     ///
-    /// None if all numbers are finite.
+    /// Fails if a number is not finite.
     pub fn to_line(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self)
     }
@@ -178,7 +178,7 @@ impl Frame {
     ///
     /// # Errors
     ///
-    /// None if all numbers are finite.
+    /// Fails if a number is not finite.
     pub fn to_line(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string(self)
     }
@@ -204,7 +204,7 @@ fn names() -> impl Iterator<Item = &'static str> {
     skeleton::PARSE14.joints.iter().map(|joint| joint.name)
 }
 
-/// Converts joints to another set, via the parts of which every set consists.
+/// Converts joints to another set, by way of the body parts from which the joints of every set are computed.
 fn in_set<const D: usize>(joints: &[[f64; D]; N_JOINTS], set: &JointSet) -> Vec<[f64; D]> {
     let mut parts = [[0.0; D]; skeleton::N_PARTS];
     for (joint, at) in skeleton::PARSE14.joints.iter().zip(joints) {

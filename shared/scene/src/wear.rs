@@ -1,4 +1,4 @@
-//! The appearance of a person: skin, hair, face and cloth at points of the body at rest.
+//! The appearance of a person: skin, hair, face and cloth, at points of the body at rest.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
@@ -12,9 +12,9 @@ use crate::subject::Subject;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Finish {
     pub(crate) colour: Linear,
-    /// Share of the light that is reflected specularly.
+    /// Fraction of the light that is reflected specularly.
     pub(crate) gloss: f32,
-    /// Vector added to the normal of the body at rest.
+    /// Vector that is added to the normal of the body at rest.
     pub(crate) bump: Vector3<f32>,
 }
 
@@ -22,7 +22,7 @@ pub(crate) struct Finish {
 #[derive(Debug, Clone)]
 pub(crate) struct Wear {
     subject: Subject,
-    /// Shoulder to wrist, and hip to ankle, on both sides at rest.
+    /// Line from shoulder to wrist on both sides, at rest; the next field is the line from hip to ankle.
     arms: [[Point3<f32>; 2]; 2],
     legs: [[Point3<f32>; 2]; 2],
     head_from_rest: Isometry3<f32>,
@@ -106,7 +106,7 @@ impl Wear {
         self.cloth(above > hem, along, at)
     }
 
-    /// Returns the position along a limb as a share, and positions around and along it in metres.
+    /// Returns the position along a limb as a fraction, and the positions around and along it in metres.
     fn along(limb: &[Point3<f32>; 2], at: &Point3<f32>) -> (f32, Vector2<f32>) {
         let axis = limb[1] - limb[0];
         let from = at - limb[0];

@@ -158,7 +158,7 @@ fn outwards(side: Side) -> f64 {
     }
 }
 
-/// Returns true if a vector with these two components is long enough to have a direction.
+/// Returns true if the vector with these two components is long enough to have a reliable direction.
 fn is_told(a: f64, b: f64) -> bool {
     a.hypot(b) > LEAST_TILT
 }
@@ -172,7 +172,7 @@ fn pelvis(points: &[Vector3<f64>]) -> Option<[Vector3<f64>; 2]> {
     Some([right, trunk])
 }
 
-/// Returns the direction of the thigh in the axes of the pelvis, in which the hip line is kept.
+/// Returns the direction of the thigh in the axes of the pelvis that keep the hip line.
 fn thigh(side: Side, points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let [right, trunk] = pelvis(points)?;
     let hip = if side == Side::Right {
@@ -197,7 +197,8 @@ fn hip_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     // Bending axis after flexion and abduction alone: perpendicular to the thigh, in the plane of the thigh and z.
     let neutral = (Vector3::z() - thigh * thigh.z).try_normalize(LEAST_TILT)?;
     let turn = thigh.dot(&neutral.cross(&hinge)).atan2(neutral.dot(&hinge));
-    // The thigh points downwards, so a positive rotation about it moves the right end of the axis backwards: outwards on the right side.
+    // The thigh points downwards, so a positive rotation about it moves the right end of the axis backwards, which is outwards on the
+    // right side.
     Some((-outwards(side) * turn).to_degrees())
 }
 
@@ -209,7 +210,7 @@ fn trunk_rotation(points: &[Vector3<f64>]) -> Option<f64> {
     is_told(line.x, line.z).then(|| line.x.atan2(line.z).to_degrees())
 }
 
-/// Returns the direction of the upper arm in the axes of the thorax with z outwards, and these axes with the sign of z.
+/// Returns the direction of the upper arm in the axes of the thorax, with z pointing outwards; also returns these axes.
 ///
 /// * `points`: right hip, left hip, neck, right shoulder, left shoulder, elbow, ...
 fn arm(side: Side, points: &[Vector3<f64>]) -> Option<(Vector3<f64>, nalgebra::Matrix3<f64>)> {
@@ -234,7 +235,7 @@ fn shoulder_rotation(side: Side, points: &[Vector3<f64>]) -> Option<f64> {
     }
     let mut forearm = axes.tr_mul(&direction(&points[5], &points[6])?);
     forearm.z *= outwards(side);
-    // After mirroring, the left arm equals the right one. A hanging arm bends forwards about an axis that points outwards.
+    // After mirroring, the left arm equals the right arm. A hanging arm bends forwards about an axis that points outwards.
     let hinge = arm.cross(&forearm).try_normalize(LEAST_BEND)?;
     // The arm is elevated about x for abduction (plane 0), and about -z for flexion (plane 90). Without a third rotation, the elbow's
     // bending axis stays perpendicular to this axis.

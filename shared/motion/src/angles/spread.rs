@@ -9,9 +9,10 @@ pub(super) type Place = (Vector3<f64>, Option<Matrix3<f64>>);
 
 /// Returns the standard deviation of `angle` for joints with independent errors; `None` if a covariance is unknown.
 ///
-/// The method is second-order divided differences (Nørgaard, Poulsen & Ravn 2000): the angle is computed at the square root of three
-/// standard deviations to both sides along every axis of every covariance. Unlike derivatives, these differences respond to the curvature
-/// of an angle, such as that of a nearly straight knee. Unlike in the unscented transform, the steps do not grow with the number of joints.
+/// The method is second-order divided differences (Nørgaard, Poulsen & Ravn 2000): the angle is also computed with each joint displaced by
+/// sqrt(3) standard deviations in both directions along every axis of its covariance. Unlike derivatives, these differences respond to the
+/// curvature of an angle, such as that of a nearly straight knee. Unlike in the unscented transform, the steps do not grow with the number
+/// of joints.
 ///
 /// # Errors
 ///
@@ -47,7 +48,7 @@ pub(super) fn sd(
     Ok(Some(variance.sqrt()))
 }
 
-/// Wraps a difference of angles to the shorter direction, in degrees.
+/// Wraps a difference of angles to the range from -180 to 180 degrees.
 fn turned(degrees: f64) -> f64 {
     (degrees + 180.0).rem_euclid(360.0) - 180.0
 }

@@ -105,7 +105,7 @@ fn a_lower_leg_that_points_outwards_from_a_bent_knee_is_internal_rotation() {
     for (side, y) in [(Right, -1.0), (Left, 1.0)] {
         let mut pose = standing();
         let (sin, cos) = (PI / 6.0).sin_cos();
-        // The heel moves outwards, so the front of the thigh rotates inwards.
+        // If the heel moves outwards, the front of the thigh rotates inwards.
         set(
             &mut pose,
             Role::Ankle(side),
@@ -126,7 +126,7 @@ fn arms_are_elevated_in_planes_and_rotate_as_the_recommendation_says() {
         is(&sideways, Angle::ShoulderPlane(side), 0.0);
         is(&sideways, Angle::ShoulderRotation(side), 0.0);
         is(&sideways, Angle::ElbowFlexion(side), 90.0);
-        // The forearm points up: external rotation.
+        // The forearm points up, which is external rotation.
         set(&mut sideways, Role::Wrist(side), [0.0, 0.5 * y, 1.7]);
         is(&sideways, Angle::ShoulderRotation(side), -90.0);
         let mut forwards = standing();
@@ -269,7 +269,7 @@ proptest! {
     #[test]
     fn nothing_makes_an_angle_that_is_no_number(places in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 18)) {
         let pose: Vec<_> = bent().iter().zip(&places).map(|(joint, place)| {
-            // Moves every second joint to one place.
+            // Moves every second joint to the same point.
             (joint.0, if place[0] > 0.0 { Vector3::zeros() } else { Vector3::from(*place) })
         }).collect();
         for (_, value) in angles(&estimates(&pose, 0.05), Some(Vector3::z_axis())) {

@@ -21,17 +21,17 @@ pub struct Run {
     pub frames: Vec<u64>,
     /// The people, by ascending id; all of them have the same instants.
     pub people: Vec<Person>,
-    /// Description of the part that is missing at the end of the file.
+    /// Description of the missing part, if the end of the file is missing.
     pub cut: Option<String>,
 }
 
 /// A person of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Person {
-    /// Ids within the run, in ascending order. There are several if no frame had two people and the followed person had
-    /// several ids, one after the other.
+    /// Ids of the person within the run, in ascending order. A person has several ids if no frame contains two people and the followed
+    /// person had several ids one after the other.
     pub ids: Vec<u64>,
-    /// Id at every instant; the previous id at instants without the person.
+    /// Id at every instant; at instants without the person, the previous id.
     pub id_at: Vec<u64>,
     /// The measured joints.
     pub recorded: Recorded,
@@ -39,7 +39,7 @@ pub struct Person {
     pub n_joints: usize,
 }
 
-/// A [`Person`] while the lines are read.
+/// A [`Person`] that is being built while the lines are read.
 #[derive(Debug, Default)]
 struct Gathered {
     ids: BTreeSet<u64>,
@@ -149,7 +149,7 @@ fn unopened(folder: &Path, path: &Path, error: &std::io::Error) -> Failure {
 pub fn read(folder: &Path, rate_hz: Option<f64>) -> Result<Run, Failure> {
     let (mut times, mut frames) = (Vec::new(), Vec::new());
     let mut people: BTreeMap<u64, Gathered> = BTreeMap::new();
-    // If there are never two people at once, all ids belong to one person, who gets another id after a gap or a jump.
+    // If there are never two people at once, all ids belong to one person, who may get another id after a gap or a jump.
     let (mut one, mut is_one) = (Gathered::default(), true);
     let path = folder.join(FrameLine::FILE);
     let cut = read_lines(folder, |nth, line| {

@@ -5,11 +5,11 @@
 pub struct Settings {
     /// The smoothing method.
     pub method: Method,
-    /// Cutoff of [`Method::Butterworth`], in Hz.
+    /// Cutoff frequency of [`Method::Butterworth`], in Hz.
     pub cutoff_hz: f64,
-    /// Maximum time between two measurements of a joint that is filled, in seconds.
+    /// Maximum time between two measurements, in seconds, for the gap to be filled.
     pub fill_s: f64,
-    /// True if [`Method::Rts`] keeps the lengths of the limbs' bones constant over the run.
+    /// True if [`Method::Rts`] keeps the bone lengths of the limbs constant over the run.
     pub constant_bones: bool,
 }
 
@@ -27,12 +27,12 @@ impl Default for Settings {
 /// Method for smoothing a finished run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Uses everything before and after, with the measured covariances.
+    /// Uses all measurements before and after an instant, with their covariances.
     #[default]
     Rts,
     /// Uses a zero-phase low-pass filter.
     Butterworth,
-    /// Uses causal filters with the measured covariances.
+    /// Uses Kalman filters, which only use earlier measurements, with their covariances.
     Kalman,
     /// Does not smooth.
     None,

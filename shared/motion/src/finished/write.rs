@@ -11,7 +11,7 @@ use runfiles::{FrameLine, MOST_PEOPLE, PersonLine, SmoothReport};
 
 use super::folder::{self, Person, Run};
 
-/// First line of `angles.csv`; one row for every angle follows.
+/// First line of `angles.csv`; after it, there is one row for each angle, person and frame.
 const CSV_HEADER: &str = "frame,time_s,person,angle,degrees,sd_degrees,state";
 /// Name of the file with the angles.
 const ANGLES: &str = "angles.csv";
@@ -49,7 +49,7 @@ pub(super) fn all(
     files::replace(&path, text.as_bytes()).map_err(|error| in_file(&path, &error))
 }
 
-/// Returns the line of an instant with smoothed joints; people who were not measured at this instant are last.
+/// Returns the line of an instant with smoothed joints; people who were not measured at this instant come last.
 fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) -> FrameLine {
     let smoothed = |person: &Person, motion: &Motion, measured: Option<PersonLine>| {
         let joints = person.recorded.joints.iter().zip(&motion.joints);
@@ -73,7 +73,7 @@ fn smoothed_line(mut line: FrameLine, at: usize, run: &Run, motions: &[Motion]) 
     lines::with_people(line, people)
 }
 
-/// Writes a row for every angle of every person and frame. Angles between joints that the person does not have are left out.
+/// Writes a row for every angle of every person and frame. Angles that need a joint that the person does not have are left out.
 fn write_angles(
     file: &mut impl io::Write,
     run: &Run,

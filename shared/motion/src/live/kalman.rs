@@ -1,7 +1,7 @@
-//! Several Kalman filters with different jerk densities side by side, weighted by the quality of their recent predictions.
+//! Several Kalman filters with different jerk densities run side by side, weighted by the quality of their recent predictions.
 //!
-//! This is the static multiple-model estimator (Bar-Shalom, Li & Kirubarajan 2001, section 11.6.2) with a limited memory. Old
-//! measurements count less, so the weights adapt to a person who begins to run.
+//! This is the static multiple-model estimator (Bar-Shalom, Li & Kirubarajan 2001, section 11.6.2) with a limited memory. Older
+//! measurements have less weight, so the filters adapt to a person who begins to run.
 
 use core::f64::consts::PI;
 
@@ -12,20 +12,21 @@ use crate::noise::Prior;
 use crate::rts::{FREEDOM, GATE, weight};
 use crate::track::{Absent, Estimate, Measured, Smoothed, State, usable};
 
-/// Number of filters. The next constants are the jerk density of the calmest filter and the step to the next one, as common logarithms
-/// relative to the joint's expectation. Most people are a hundred times more restless when they run than when they stand.
+/// Number of filters. The next constants are the lowest jerk density and the step from one filter to the next, as common logarithms
+/// relative to the density expected for the joint. For most people, the jerk density is a hundred times higher when they run than when they
+/// stand.
 const N_MODELS: usize = 6;
 const CALMEST: f64 = -1.0;
 const APART: f64 = 1.0;
 /// Time constant with which accelerations decay while nothing is measured, in seconds.
 const CALM_S: f64 = 0.1;
-/// Time for which measurements count in the weights, in seconds.
+/// Time after which measurements no longer have much effect on the weights, in seconds.
 const MEMORY_S: f64 = 2.0;
 /// Maximum time without a measurement before the filters of a joint are restarted, in seconds.
 const FORGET_S: f64 = 1.0;
 /// Minimum and maximum plausible scale of covariances.
 const SCALES: [f64; 2] = [1e-2, 1e2];
-/// After this many successive measurements that contradict the prediction, the measurements are trusted instead of the prediction.
+/// Number of successive measurements that contradict the prediction after which the measurements are trusted instead of the prediction.
 const MOST_REJECTED: u32 = 5;
 /// Frequency of the movement for which the delay is reported, in Hz.
 const DELAY_HZ: f64 = 1.0;
@@ -46,7 +47,7 @@ struct Model {
     ratio: f64,
     belief: Belief,
     scale: f64,
-    /// Discounted log-likelihood.
+    /// Log-likelihood of the measurements, with less weight for older ones.
     score: f64,
 }
 
@@ -61,7 +62,7 @@ impl Models {
         }
     }
 
-    /// * Returns the position, predicted if nothing was measured, and the delay of movement at 1 Hz, in seconds.
+    /// * Returns the position, which is a prediction if nothing was measured. Also returns the delay of movement at 1 Hz, in seconds.
     pub(super) fn step(
         &mut self,
         time_s: f64,
@@ -207,8 +208,8 @@ fn said(models: &[Model; N_MODELS], state: State) -> Option<Estimate> {
     })
 }
 
-/// Delay of movement at [`DELAY_HZ`] by a filter with this gain, in seconds, computed from its phase. Negative if the filter
-/// runs ahead.
+/// Returns the delay, in seconds, of movement at [`DELAY_HZ`] after a filter with this gain, computed from its phase. It is negative if the
+/// filter runs ahead.
 fn delay_s(gain: Vector3<f64>, dt: f64) -> f64 {
     let transition = Matrix3::new(1.0, dt, 0.5 * dt * dt, 0.0, 1.0, dt, 0.0, 0.0, 1.0);
     let seen = Matrix3::identity() - gain * RowVector3::new(1.0, 0.0, 0.0);

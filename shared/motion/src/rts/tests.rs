@@ -3,12 +3,12 @@
 use super::*;
 use crate::{Joint, Measured, Recorded, Role, Settings, Side, Sides, State};
 
-/// Returns an approximately standard normal number: the sum of 12 uniform ones.
+/// Returns a number with an approximately standard normal distribution: the sum of 12 uniform numbers.
 fn normal(random: &mut fastrand::Rng) -> f64 {
     (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
 }
 
-/// Returns a swinging wrist, 20 cm at 1 Hz, in metres.
+/// Returns the position of a wrist that swings by 20 cm at 1 Hz, in metres.
 fn swing(time: f64) -> Vector3<f64> {
     let turn = core::f64::consts::TAU * time;
     Vector3::new(
@@ -18,7 +18,7 @@ fn swing(time: f64) -> Vector3<f64> {
     )
 }
 
-/// Swinging wrists of both sides, 60 cm apart, measured with white errors.
+/// Returns the swinging wrists of both sides, 60 cm apart, measured with uncorrelated errors.
 fn recorded(rate_hz: f64, sd_m: f64, told_sd_m: f64, seconds: f64) -> Recorded {
     let mut random = fastrand::Rng::with_seed(5);
     let n = (rate_hz * seconds) as usize;
@@ -190,7 +190,7 @@ fn somebody_else_begins_anew() {
 #[test]
 fn bones_that_are_asked_for_are_constant() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
-    // The elbow of the forearm is below the wrist, with its own errors.
+    // The elbow is below the wrist, with errors of its own.
     let mut elbow = recorded.joints[0].clone();
     elbow.name = "right elbow".to_owned();
     elbow.role = Some(Role::Elbow(Side::Right));
@@ -247,7 +247,7 @@ fn numbers_that_are_none_and_irregular_times_come_through() {
             _ => {}
         }
     }
-    // The truth is at the original times.
+    // The true positions are known at the original times.
     for (at, it) in recorded.times.iter_mut().enumerate() {
         *it += if at % 2 == 0 { 0.004 } else { 0.0 };
     }

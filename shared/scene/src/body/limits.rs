@@ -4,8 +4,8 @@ use super::N_BONES;
 
 /// Minimum and maximum flexion, abduction and twist of every bone.
 ///
-/// The values are rounded from the normal ranges of the American Academy of Orthopaedic Surgeons; the ranges of the spine are
-/// divided between two bones.
+/// The values are the normal ranges of the American Academy of Orthopaedic Surgeons, rounded; the ranges of the spine are divided between
+/// two bones.
 pub(crate) const LIMITS: [[[f64; 2]; 3]; N_BONES] = [
     [[0.0, 0.0], [0.0, 0.0], [0.0, 0.0]],
     [[-15.0, 50.0], [-20.0, 20.0], [-15.0, 15.0]],

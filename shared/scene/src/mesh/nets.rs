@@ -1,4 +1,4 @@
-//! Creates a closed surface of triangles where a lattice of distances changes its sign.
+//! Creates a closed surface of triangles where the distances on a grid change sign.
 
 use nalgebra::{Point3, Vector3};
 
@@ -50,7 +50,7 @@ pub(super) fn surface(grid: &Grid) -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
     (points, triangles)
 }
 
-/// Returns the four cells around an edge of the lattice, anticlockwise as seen against the direction of the edge.
+/// Returns the four cells around an edge of the grid, anticlockwise as seen against the direction of the edge.
 fn around(at: [usize; 3], axis: usize) -> [[usize; 3]; 4] {
     let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
     [[1, 1], [0, 1], [0, 0], [1, 0]].map(|[du, dv]| {

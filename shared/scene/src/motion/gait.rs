@@ -8,16 +8,17 @@ use crate::body::{FOOT, FOREARM, SHIN, THIGH, UPPER_ARM};
 
 /// Parameters of a gait.
 struct Gait {
-    /// Strides (two steps) per second, and length of a stride in multiples of the person's height.
+    /// Number of strides (two steps) per second; the next field is the length of a stride in multiples of the person's height.
     hertz: f64,
     stride: f64,
-    /// Centre and swing of the hips, and fold of the knees in swing and in stance, in degrees.
+    /// Centre and amplitude of the hip's swing; the next field is the bend of the knee in the swing phase and the stance phase. All are in
+    /// degrees.
     hip: [f64; 2],
     knee: [f64; 2],
     arm: f64,
     elbow: f64,
     lean: f64,
-    /// Height of the flight between steps, in metres.
+    /// Height of the body's flight between steps, in metres.
     flight: f64,
 }
 
@@ -51,14 +52,14 @@ pub(super) fn jogging(actor: &Actor, seconds: f64) -> Stance {
     gait_stance(actor, &gait, seconds)
 }
 
-/// Returns a bump around a phase of the stride, with height 1.
+/// Returns a smooth peak of height 1 around a phase of the stride.
 fn bump(phase: f64, at: f64, width: f64) -> f64 {
     let off = (phase - at + 0.5).rem_euclid(1.0) - 0.5;
     (-0.5 * (off / width).powi(2)).exp()
 }
 
-/// Returns the stance at a time. Joint angles over the stride are bumps and waves fitted by eye to the curves of Winter, *Biomechanics and
-/// Motor Control of Human Movement*.
+/// Returns the stance at a time. Joint angles over the stride are peaks and sine waves, fitted by eye to the curves of Winter,
+/// *Biomechanics and Motor Control of Human Movement*.
 fn gait_stance(actor: &Actor, gait: &Gait, seconds: f64) -> Stance {
     let style = actor.subject.style;
     let mut stage = actor.random.fork("way");

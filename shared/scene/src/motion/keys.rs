@@ -1,4 +1,4 @@
-//! Actions that consist of key poses at regular beats; key poses are random where the action allows it.
+//! Actions that consist of key poses at regular intervals, here called beats. Key poses are random where the action allows it.
 
 use super::stance::Stance;
 use super::{Action, Actor, Motion};
@@ -22,7 +22,7 @@ fn beat_seconds(action: Action) -> f64 {
 pub(super) fn stance(actor: &Actor, action: Action, seconds: f64) -> Stance {
     let beats = seconds * actor.subject.style.tempo / beat_seconds(action);
     let nth = beats.floor();
-    // The first three quarters of a beat move to the next pose, and the last quarter keeps it.
+    // In the first three quarters of a beat, the body moves to the next pose; in the last quarter, it keeps this pose.
     let share = ((beats - nth) / 0.75).min(1.0);
     let share = share * share * (3.0 - 2.0 * share);
     let nth = nth as i64;
@@ -203,7 +203,7 @@ fn grab(it: Stance, phase: i64, random: &mut Random) -> Stance {
     }
 }
 
-/// Returns the variant of leaning. It stays the same for a whole performance because the furniture does not move.
+/// Returns the variant of leaning. It is the same throughout a performance, because the furniture does not move.
 fn leaning_variant(actor: &Actor) -> u64 {
     actor.random.fork("lean").bits() % 3
 }

@@ -15,7 +15,7 @@ pub(super) struct Stance {
     pub(super) pitch: f64,
     pub(super) roll: f64,
     pub(super) spin: f64,
-    /// Position of the middle of the feet (or of the hips), in metres.
+    /// Position of the point midway between the feet (or between the hips), in metres.
     pub(super) place: [f64; 2],
     /// True if `place` is the position of the feet.
     pub(super) planted: bool,
@@ -109,7 +109,7 @@ impl Stance {
         self
     }
 
-    /// Interpolates between this stance and another; the place and the heading remain those of this stance.
+    /// Interpolates between this stance and another; position and heading remain those of this stance.
     pub(super) fn towards(&self, other: &Self, share: f64) -> Self {
         let mix = |a: f64, b: f64| a + (b - a) * share;
         let angles = core::array::from_fn(|bone| {

@@ -1,4 +1,4 @@
-//! Tests that joint limits, bone lengths, the floor and the sides are respected.
+//! Tests that joint limits and bone lengths are respected, that bodies stay above the floor, and that left and right are correct.
 
 use proptest::prelude::*;
 
@@ -44,7 +44,7 @@ proptest! {
         }
     }
 
-    /// Checked from the points alone: knees and elbows fold in one direction only.
+    /// Knees and elbows bend in one direction only; this is checked from the points alone.
     #[test]
     fn knees_and_elbows_never_bend_backwards(
         number in 0_u64..200, action in action(), seed in 0_u64..1000, seconds in 0.0..60.0,

@@ -1,4 +1,4 @@
-//! The readable reference: rays through the samples are intersected with every triangle.
+//! The readable reference rasteriser: intersects rays through the samples with every triangle.
 
 use geometry::Camera;
 use nalgebra::{Point2, Point3, Vector3};
@@ -86,7 +86,7 @@ mod tests {
                 match (ray, found) {
                     (Some((_, ray)), Some(found)) => {
                         n_seen += 1;
-                        // A sample on a silhouette may get a different triangle.
+                        // A sample on the outline may get a different triangle.
                         n_edge += usize::from((ray - found).abs() > 2e-3);
                     }
                     (None, None) => {}

@@ -6,7 +6,7 @@ use super::*;
 use crate::motion::{Action, Motion};
 use crate::subject::Subject;
 
-/// Returns an error-free recording of a generated action.
+/// Returns a perfect recording of a generated action.
 fn recorded(number: u64, action: Action, rate_hz: f64, n: usize) -> (Recording, Motion) {
     let motion = Motion::new(&Subject::new(number), action, 7);
     let posture = |nth: usize| {
@@ -42,7 +42,7 @@ fn a_subject_reproduces_the_subjects_own_recording() {
             let got = bones.joints(&it.frames(seconds));
             let expected = motion.bones.joints(&motion.bones.frames(&motion.pose(seconds)));
             for joint in 0..N_JOINTS {
-                // Joints alone do not determine where the trunk bends, and the path may be moved as a whole.
+                // The joints alone do not determine where the trunk bends, and the whole path may be shifted.
                 let error =
                     (got[joint] - got[NECK_JOINT]) - (expected[joint] - expected[NECK_JOINT]);
                 assert!(

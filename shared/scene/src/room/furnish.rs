@@ -36,7 +36,7 @@ const BODIES: [Material; 7] = [
     Material::Plain([64, 100, 66]),
 ];
 
-/// Radius around the middle that contains only the action's own furniture, in metres.
+/// Radius around the middle of the room, in metres, within which there is only the furniture that the action needs.
 const CLEAR_RADIUS: f32 = 1.75;
 
 pub(super) fn room(random: Random, cameras: &[Point3<f32>], furniture: Vec<Block>) -> Room {

@@ -31,7 +31,7 @@ fn chequered(u: f32, v: f32) -> f32 {
 }
 
 impl Material {
-    /// Returns the colour at a place, which is given in metres in the object's own frame, or from -1 to 1 across a panel.
+    /// Returns the colour at a point, which is given in metres in the object's own frame, or from -1 to 1 across a flat object on a wall.
     pub(crate) fn colour(self, at: &Vector3<f32>) -> Linear {
         let grain = |scale: f32, size: f32| 1.0 + size * noise(&(at * scale), 21);
         match self {
@@ -94,7 +94,7 @@ impl Material {
         }
     }
 
-    /// Returns the colour of the frame around a panel of this material.
+    /// Returns the colour of the frame around a flat object of this material.
     pub(super) fn frame(self) -> Linear {
         match self {
             Self::Window(_) => srgb([225, 224, 220]),

@@ -1,4 +1,4 @@
-//! Tests that rays end at walls and furniture, and that the cameras' views of the stage are free.
+//! Tests that rays end at walls and furniture, and that nothing blocks the cameras' views of the stage.
 
 use proptest::prelude::*;
 

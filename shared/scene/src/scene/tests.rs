@@ -69,7 +69,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
                 (x1 - 3.0..=x2 + 3.0).contains(&x) && (y1 - 3.0..=y2 + 3.0).contains(&y),
                 "{action:?}"
             );
-            // The joint is within 3 pixels of the person.
+            // The joint must be within 3 pixels of the visible person.
             let near =
                 (-3..=3).flat_map(|dy| (-3..=3).map(move |dx| (x as i64 + dx, y as i64 + dy)));
             let on = near.filter(|(x, y)| {
@@ -87,7 +87,7 @@ fn visible_joints_lie_on_the_mask_and_the_box_encloses_the_mask() {
 
 #[test]
 fn joints_behind_the_body_are_not_visible() {
-    // Around the ring, every joint of the limbs is occluded in some view and visible in another.
+    // With cameras all around, every joint of the limbs is hidden in some view and visible in another.
     let scene = scene("ring:8", Action::Walking, 1);
     let views = (0..8).map(|i| View::new(&scene, i).unwrap().truth(3).visible);
     let views: Vec<_> = views.collect();

@@ -122,7 +122,7 @@ impl SolidBuilder<'_> {
         }
     }
 
-    /// Slack of a sleeve or trouser leg at a position along the limb, given as a share of its length.
+    /// Returns the slack of a sleeve or trouser leg at a position along the limb, given as a fraction of its length.
     fn cover(share: f32, until: f32, slack: f32) -> f32 {
         if share < until { slack } else { 0.0 }
     }

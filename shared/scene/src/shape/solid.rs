@@ -122,7 +122,7 @@ fn cone(p: &Vector3<f32>, axis: &Vector3<f32>, [first, second]: [f32; 2]) -> f32
     let taper = first - second;
     let flat2 = length2 - taper * taper;
     if flat2 <= 0.0 {
-        // One ball contains the other.
+        // If one ball contains the other, the solid is a ball.
         return (p.norm() - first).min((p - axis).norm() - second);
     }
     let y = p.dot(axis);
@@ -146,7 +146,8 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Compares with brute force: a cone is the union of the balls between its ends (up to the error of the step).
+        /// Compares with a brute-force computation, in which a cone is the union of the balls between its ends (up to an error from the
+        /// finite number of balls).
         #[test]
         fn a_cone_is_the_union_of_balls(
             x in -1.0_f32..1.0, y in -1.0_f32..1.0, z in -1.0_f32..2.0,
