@@ -1,7 +1,8 @@
 //! Round trip between two processes that sleep until they are woken.
 //!
-//! The messages are 64 bytes, an image of 172 x 224 (115 584 bytes), and the response maps of all levels of an image (40 megabytes),
-//! all sent in place. For comparison, the same maps are copied once in each direction, which is the best case of a socket.
+//! The messages are 64 bytes, an image of 172 x 224 pixels (115 584 bytes), and the response maps of all levels of an image (40 megabytes).
+//! All are sent without copying. For comparison, the same maps are also copied once in each direction, which is the best that a socket
+//! could achieve.
 #![expect(clippy::unwrap_used, reason = "a bench fails by panicking")]
 #![expect(clippy::print_stdout, reason = "a bench prints its results")]
 
@@ -17,7 +18,7 @@ use runtime::{
     Waiter,
 };
 
-/// Name, number of f32 values, and rounds of each workload.
+/// Name, number of `f32` values, and number of rounds of each workload.
 const WORKLOADS: [(&str, usize, usize); 4] = [
     ("64 bytes", 16, 2000),
     ("115 584 bytes", 115_584 / 4, 2000),
@@ -115,7 +116,7 @@ fn measure(name: &str, len: usize, rounds: usize, copies: bool) {
     publisher.wait_for_subscribers(1, Duration::from_mins(1));
     let mut own = vec![0.0; len];
     let mut micros: Vec<f64> = Vec::new();
-    // The first messages wait for the other process to start.
+    // Wait for the first messages until the other process has started.
     while micros.len() < rounds + 50 {
         let begin = Instant::now();
         write(&publisher, len, copies.then_some(&own));

@@ -1,6 +1,6 @@
 //! Access to files and directories relative to the descriptor of their parent directory.
 //!
-//! Between two uses of a path, another process may put another file there, but a descriptor stays the same. No function of this
+//! Between two uses of a path, another process may replace the file, but a descriptor always refers to the same file. No function of this
 //! module follows a symbolic link.
 
 use std::ffi::{CStr, CString};
@@ -13,7 +13,7 @@ use std::path::Path;
 use rustix::fs::{AtFlags, CWD, Dir, FileType, Mode, OFlags, Stat, openat, statat, unlinkat};
 use rustix::io::Errno;
 
-/// Maximum depth to which directories are removed: iceoryx2 nests two levels.
+/// Maximum depth to which directories are removed; iceoryx2 nests directories two levels deep.
 const DEEPEST: usize = 8;
 
 /// Opens a directory by its path, whose last component must not be a symbolic link.

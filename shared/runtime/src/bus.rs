@@ -17,7 +17,7 @@ use crate::topic::{Topic, TopicPlan};
 use crate::{Copies, Namespace, Progress, free_shared_memory, private};
 use failure::Stop;
 
-/// Default time that a sender waits for a receiver that has no room.
+/// Default time for which a sender waits if a receiver has no room for the message.
 const PATIENCE: Duration = Duration::from_mins(2);
 
 /// A process's connection to the shared memory of its deployment. It creates the ports of the process.
@@ -75,14 +75,14 @@ impl Bus {
         })
     }
 
-    /// Sets the time that a sender waits for a receiver that has no room before it fails. The default is two minutes.
+    /// Sets how long a sender waits for a receiver that has no room, before sending fails. The default is two minutes.
     #[must_use]
     pub fn with_patience(mut self, patience: Duration) -> Self {
         self.patience = patience;
         self
     }
 
-    /// Sets whether waiters of this bus poll without pause instead of sleeping until a message arrives.
+    /// Sets whether waiters of this bus poll continuously, instead of sleeping until a message arrives.
     ///
     /// A receiver that polls occupies a core, but receives messages within one or two microseconds. The default is to sleep.
     #[must_use]
@@ -91,9 +91,10 @@ impl Bus {
         self
     }
 
-    /// Makes this process an onlooker: no sender wakes it, waits for room in its queues, or counts it among its receivers.
+    /// Makes this process an onlooker, which receives messages without affecting the senders: no sender wakes it, waits for room in its
+    /// queues, or counts it among its receivers.
     ///
-    /// An onlooker polls. With lossless delivery, it misses messages that do not fit into its queues.
+    /// An onlooker polls. Even with lossless delivery, it misses messages that do not fit into its queues.
     #[must_use]
     pub fn as_onlooker(mut self) -> Self {
         self.looks_on = true;
@@ -134,7 +135,7 @@ impl Bus {
         &self.progress
     }
 
-    /// Returns the count of bytes that the ports of this bus have copied, without the heartbeats.
+    /// Returns the count of bytes that the ports of this bus have copied, not counting heartbeats.
     pub fn copies(&self) -> &Copies {
         &self.copies
     }

@@ -29,7 +29,7 @@ pub enum BusError {
     /// iceoryx2 does not accept the namespace.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
-    /// There is no room for the queues of a process. The system would kill the process at its first write to them.
+    /// There is no room in memory for the queues of a process. The system would kill the process when it first writes to them.
     #[error(
         "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
         .needed_bytes / 1000, .free_bytes / 1000
@@ -76,7 +76,7 @@ pub enum BusError {
     /// iceoryx2 does not accept the name of a topic or a process.
     #[error("name {name:?} is empty, too long, or not plain text")]
     Name {
-        /// Name that was refused.
+        /// The rejected name.
         name: String,
     },
 }

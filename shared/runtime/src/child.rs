@@ -167,8 +167,8 @@ fn state_in(stat: &str) -> Option<char> {
 
 /// Kills a process (SIGKILL), as a crash would do. Used for fault injection.
 ///
-/// Call this only while the process cannot have been reaped, for example between the supervisor's events
-/// `Started` and `Died`. A released process id may belong to another process.
+/// Call this only while the process cannot have been reaped, for example between the supervisor's events `Started` and `Died`. After that,
+/// its process id may belong to another process.
 ///
 /// # Errors
 ///
@@ -179,7 +179,7 @@ pub fn kill(pid: u32) -> io::Result<()> {
 
 /// Stops a process (SIGSTOP), as a hang would do. Used for fault injection.
 ///
-/// Call it only when [`kill`] may be called.
+/// Call this only when [`kill`] may be called.
 ///
 /// # Errors
 ///
@@ -190,7 +190,7 @@ pub fn freeze(pid: u32) -> io::Result<()> {
 
 /// Continues a process that [`freeze`] stopped (SIGCONT).
 ///
-/// Call it only when [`kill`] may be called.
+/// Call this only when [`kill`] may be called.
 ///
 /// # Errors
 ///
@@ -325,8 +325,8 @@ mod tests {
         let (lines, status) = run(&mut child);
         assert!(!status.success());
         let orphan = format!("/proc/{}/stat", lines[0]);
-        // The state follows the name, which is in parentheses. A process that begins another program has no command line for
-        // a moment, but it has a state.
+        // In `/proc`, the state follows the name, which is in parentheses. A process that is replaced by another program has no command
+        // line for a moment, but it has a state.
         let is_alive = || {
             let stat = std::fs::read_to_string(&orphan).unwrap_or_default();
             let state = stat.rsplit(") ").next().unwrap_or_default();

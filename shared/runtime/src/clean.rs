@@ -9,7 +9,7 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState, ipc};
 
 use crate::Bus;
 
-/// Time to wait for another supervisor that does the same clean-up, because its run is ending.
+/// Time to wait for another supervisor that is cleaning up at the same time because its run is ending.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 /// Mode bit of a file that its owner may write.
@@ -24,7 +24,7 @@ const OWNER_WRITES: u32 = 0o200;
 /// that needs the slot could then never start.
 #[derive(Debug, Default)]
 pub struct Cleaner {
-    /// Dead nodes that could not be removed.
+    /// Dead nodes that could not be removed so far.
     stubborn: BTreeSet<u128>,
 }
 
@@ -35,7 +35,7 @@ impl Cleaner {
     /// node cannot be removed. If clean-up has failed twice, such files are therefore removed first. Complete files
     /// stay, because they record the slots of the process.
     pub fn clean(&mut self, bus: &Bus) -> usize {
-        // iceoryx2 may report a node as cleaned although it is still there, so check again.
+        // iceoryx2 may report a node as cleaned although it still exists, so check again.
         let before = dead(bus);
         bus.node().blocking_cleanup_dead_nodes(PATIENCE);
         let mut after = dead(bus);

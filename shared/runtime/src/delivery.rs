@@ -1,9 +1,9 @@
-//! Behaviour of a topic with a slow receiver, its number of ports, and their buffers.
+//! How a topic treats a slow receiver, and how many ports and buffers it has.
 
 /// Behaviour when a receiver is slower than its sender.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
-    /// The sender never waits. A full buffer drops its oldest message, so that the latest frame wins.
+    /// The sender never waits. A full buffer drops its oldest message, so that the receiver gets the latest frame.
     #[default]
     Realtime,
     /// Nothing is lost. A full buffer makes the sender wait.
@@ -12,9 +12,8 @@ pub enum Delivery {
 
 /// The number of ports of a topic, and their buffers.
 ///
-/// Memory is reserved for the worst case, so that a sender always has some. Each publisher has
-/// `subscribers * (buffer + borrowed) + onlookers * (buffer + 1) + loaned` chunks, unless
-/// [`TopicPlan::with_few_chunks`](crate::TopicPlan::with_few_chunks) is used.
+/// Memory is reserved for the worst case, so that a sender never lacks memory. Each publisher has `subscribers * (buffer + borrowed) +
+/// onlookers * (buffer + 1) + loaned` chunks, unless [`TopicPlan::with_few_chunks`](crate::TopicPlan::with_few_chunks) is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Maximum number of publishers.

@@ -1,10 +1,10 @@
-//! Ports of bytes, whose message types are known only at run time.
+//! Ports that treat messages as bytes, and whose message types are known only at run time.
 //!
-//! The types of a topic are values here. iceoryx2 is therefore compiled once, in this crate, and not in every crate for every message
-//! that it sends.
+//! The types of a topic are described by values here. iceoryx2 is therefore compiled only once, in this crate, instead of in every crate
+//! for every message type.
 //!
-//! iceoryx2 offers this interface to its bindings for other languages. A topic is opened with the names, sizes and alignments of
-//! its types. As with types known to the compiler, it is refused if they differ from the types with which it was created.
+//! iceoryx2 offers this interface to its bindings for other languages. A topic is opened with the names, sizes and alignments of its types.
+//! As with types known to the compiler, this fails if they differ from the types with which the topic was created.
 #![expect(
     unsafe_code,
     reason = "iceoryx2 hands out bytes, and takes the types of a topic on trust"
@@ -229,7 +229,7 @@ impl<S: Service> Received<S> {
     }
 }
 
-/// Checks that a chunk is read or written as its own type. Only a mistake in this crate can make the check fail.
+/// Checks that a chunk is read or written as its own type. Only an error in this crate can make the check fail.
 fn check<E: Message, H: Header>(ids: Ids) {
     const { assert!(size_of::<E>() > 0) };
     let asked = Ids {

@@ -28,7 +28,7 @@ use crate::subscriber::onlooker;
 use crate::{LockError, Namespace, NamespaceError, ReceiveError, deployments};
 use failure::{ExitKind, Fault};
 
-/// Maximum number of guests of one deployment at the same time.
+/// Maximum number of guests ([`Guest`]) of one deployment at the same time.
 pub const MOST_GUESTS: usize = 4;
 /// Directory of the files that guests lock, one file for each guest.
 const SEATS: &str = "guests";
@@ -38,15 +38,15 @@ type Transport = ipc_threadsafe::Service;
 /// Reason why a deployment cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum GuestError {
-    /// The deployment does not run, or is about to end.
+    /// The deployment is not running, or is about to end.
     #[error("deployment {name:?} does not run; {}", running_ones(.running))]
     NotRunning {
         /// Name of the deployment.
         name: String,
-        /// Names of the deployments that run.
+        /// Names of the deployments that are running.
         running: Vec<String>,
     },
-    /// The maximum number of programs already read the deployment.
+    /// The deployment is already read by the maximum number of programs.
     #[error("{most} programs already read deployment {name:?}, which is the limit: {}", .guests.join(", "))]
     Full {
         /// Name of the deployment.
@@ -64,7 +64,7 @@ pub enum GuestError {
         /// Name of the topic.
         topic: String,
     },
-    /// The messages of a topic are of another version than this program reads.
+    /// The messages of a topic have a different version from the one that this program reads.
     #[error(
         "deployment {name:?} sends {topic:?} version {theirs}, this program reads version {ours}"
     )]
@@ -145,9 +145,9 @@ fn running_ones(running: &[String]) -> String {
 
 /// A program that reads the topics of a running deployment.
 ///
-/// A guest cannot send. No sender waits for it, wakes it, or counts it among its receivers. The deployment does not wait for guests
-/// when it ends: drop the guest, its ports and their messages within a second after [`Self::is_over`] returns true. As long as the
-/// guest exists, the next run of the deployment cannot start.
+/// A guest cannot send. No sender waits for it, wakes it, or counts it among its receivers. The deployment does not wait for guests when it
+/// ends. So drop the guest, its ports and their messages within a second after [`Self::is_over`] returns true. The next run of the
+/// deployment cannot start before that.
 #[derive(Debug)]
 pub struct Guest {
     node: Arc<Node<Transport>>,
@@ -355,7 +355,7 @@ impl<E: Message, H: Header> Seen<E, H> {
     }
 }
 
-/// Returns the names of this user's deployments that run.
+/// Returns the names of this user's running deployments.
 ///
 /// # Errors
 ///
@@ -380,7 +380,7 @@ fn parts_of(topic: &str) -> Option<(&str, &str, &str)> {
     Some((about, version, whose))
 }
 
-/// Takes a free place among the guests. The place is a locked file, which the system unlocks when this process ends for any reason.
+/// Takes one of the limited places for guests. The place is a locked file, which the system unlocks when this process ends for any reason.
 fn seat(namespace: &Namespace) -> Result<File, GuestError> {
     let name = || namespace.name().to_owned();
     let failed = |source| GuestError::Directory {

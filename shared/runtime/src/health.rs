@@ -53,7 +53,7 @@ struct Counts {
     finished: AtomicU32,
     refused: [AtomicU64; Refusal::N],
     ended: AtomicBool,
-    /// Frame after which the main loop hangs on purpose, once the message of a later frame has been sent.
+    /// Frame number used for fault injection: once the message of a later frame has been sent, the main loop hangs on purpose.
     spins_after: AtomicU64,
     began_at_nanos: u64,
     meter: Mutex<Meter>,
@@ -125,7 +125,7 @@ impl Health {
         self.counts.n_received.fetch_add(n, Ordering::Relaxed);
     }
 
-    /// Counts a sent message and an iteration of the main loop, because a process that is always busy never waits.
+    /// Counts a sent message. This also counts as an iteration of the main loop, because a process that is always busy never waits.
     ///
     /// The first message triggers a heartbeat at once, so that the supervisor soon knows that the process works.
     pub fn sent(&self, frame: u64) {
@@ -173,7 +173,7 @@ impl Health {
         self.counts.meter(|meter| meter.spent(span, view, nanos));
     }
 
-    /// Records the number of frames or results that wait in the process.
+    /// Records the number of frames or results that are waiting in the process.
     pub fn queued(&self, n: usize) {
         self.counts.meter(|meter| meter.queued(n));
     }
@@ -188,7 +188,7 @@ impl Health {
         self.counts.meter(|meter| meter.camera(counts));
     }
 
-    /// Counts a frame that the processor computed because the GPU was lost. Logs the first one.
+    /// Counts a frame that was computed on the processor because the GPU was lost. Logs the first such frame.
     pub fn without_gpu(&self) {
         if self.counts.n_without_gpu.fetch_add(1, Ordering::Relaxed) == 0 {
             tracing::warn!("the GPU was lost: the processor computes from now on");
@@ -207,7 +207,7 @@ impl Health {
         self.counts.meter(|meter| meter.belongs_to(view, name));
     }
 
-    /// Sets the total number of frames, if it is known.
+    /// Sets the total number of frames, if the number is known.
     pub fn set_total(&self, frames: u64) {
         self.counts.n_total.store(frames, Ordering::Relaxed);
     }
@@ -246,8 +246,8 @@ impl<'a> Sender<'a> {
         })
     }
 
-    /// Sends until this process ends. The last messages are sent after the end, so that the final counts are reported. A new
-    /// observer gets metrics at once.
+    /// Sends until this process ends. The last messages are sent after the end, so that they contain the final counts. A new observer gets
+    /// metrics at once.
     fn send_until_ended(&self) {
         let mut rates = Rates::new(self.counts.began_at_nanos);
         let (mut n_heartbeats, mut n_observers) = (0_u32, 0);
@@ -344,6 +344,6 @@ fn spin() -> ! {
 fn cpu_millis() -> u32 {
     let used = clock_gettime(ClockId::ProcessCPUTime);
     let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;
-    // The high bits do not matter: only differences are used.
+    // The high bits do not matter, because only differences are used.
     (millis & i64::from(u32::MAX)) as u32
 }

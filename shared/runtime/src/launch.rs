@@ -8,7 +8,7 @@ use tracing::Level;
 use crate::{Delivery, Namespace, NamespaceError, Scheduling};
 use failure::{ExitKind, Fault};
 
-/// Reason why the arguments of a service were not written by a supervisor.
+/// Reason why the arguments of a service do not come from a supervisor.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LaunchError {
     /// A required flag is missing.
@@ -49,13 +49,13 @@ pub struct Launch {
     pub session: u64,
     /// Number of restarts of the process, which goes into the stamp of every message.
     pub epoch: u32,
-    /// Behaviour when a receiver is slower than its sender.
+    /// What happens if a receiver is slower than its sender.
     pub delivery: Delivery,
     /// Process id of the supervisor. This process ends when the supervisor ends.
     pub supervisor: Option<u32>,
     /// The least severe events that are logged.
     pub log: Level,
-    /// Requests of the process to the system's scheduler.
+    /// Settings that the process requests from the system's scheduler.
     pub scheduling: Scheduling,
 }
 
@@ -104,7 +104,7 @@ impl Launch {
         args
     }
 
-    /// Takes the arguments of the launch out of a command line and returns the remaining arguments, in order.
+    /// Takes the launch arguments out of a command line, and returns the remaining arguments in order.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! The lock of a deployment. Only one run is possible at a time. There are no leftover files when it starts or ends.
+//! The lock of a deployment. It ensures that only one run is possible at a time, and that each run starts and ends without leftover files.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -22,13 +22,13 @@ use failure::{ExitKind, Fault};
 
 /// Name of the process that holds the lock of a deployment. The process opens its [`Bus`](crate::Bus) with this name.
 pub const SUPERVISOR: &str = "supervisor";
-/// File that tells observers that the deployment is ending.
+/// Name of the file that tells observers that the deployment is ending.
 pub(crate) const ENDING_FILE: &str = "ending";
 /// Name of the description while it is being written.
 const UNFINISHED_FILE: &str = "deployment.json.new";
-/// Time that observers have to leave.
+/// Time within which observers have to disconnect.
 const OBSERVER_LIMIT: Duration = Duration::from_secs(1);
-/// Time that the processes of a killed supervisor have to end.
+/// Time within which the processes of a killed supervisor have to end.
 const DYING_LIMIT: Duration = Duration::from_secs(3);
 const DYING_PAUSE: Duration = Duration::from_millis(20);
 
@@ -43,7 +43,7 @@ pub enum LockError {
         /// Process id of the supervisor.
         pid: String,
     },
-    /// The supervisor of the deployment is gone, but some of its processes are still alive.
+    /// The supervisor of the deployment is dead, but some of its processes are still alive.
     #[error("processes of an earlier run of deployment {name:?} are still there: {processes}")]
     StillAlive {
         /// Name of the deployment.
@@ -154,7 +154,7 @@ impl DeploymentLock {
             .map_err(|error| failed(error.into()))
     }
 
-    /// Waits until the observers have left. Returns at once if there is no observer.
+    /// Waits until the observers have disconnected. Returns at once if there is no observer.
     fn wait_for_observers_to_leave(&self) {
         if alive(&self.config).is_empty() {
             return;

@@ -1,4 +1,5 @@
-//! Processes that were given up. Files beside the deployment's sockets mark them, so that other processes need not wait for them.
+//! Processes that the supervisor has given up. They are marked by files beside the deployment's sockets, so that other processes need not
+//! wait for them.
 
 use core::time::Duration;
 use std::fs::{self, File};
@@ -10,12 +11,12 @@ use crate::Namespace;
 /// Ending of the file that marks a process.
 const MARK: &str = "lost";
 
-/// Time that a sender waits for its receivers.
+/// How long a sender waits for its receivers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Patience {
     /// Longest wait.
     pub limit: Duration,
-    /// Longest wait if at least as many processes were given up as receivers are missing.
+    /// Longest wait, if the number of processes that were given up is at least the number of missing receivers.
     pub after_losses: Duration,
 }
 

@@ -1,4 +1,4 @@
-//! Location of data in shared memory, which is the same for all processes that map the data.
+//! Location of data in shared memory; it is the same in all processes that map the data.
 
 use std::io;
 use std::path::PathBuf;

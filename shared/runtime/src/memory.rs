@@ -89,12 +89,12 @@ pub(crate) fn memory_now() -> Option<[u64; 2]> {
     Some([bytes("VmRSS:")?, bytes("VmHWM:")?])
 }
 
-/// Allocates every page of a publisher's pool, and maps the pages of its first chunks. The publisher reuses these chunks as long as
-/// they suffice.
+/// Allocates every page of a publisher's pool, and maps the pages of its first chunks. The publisher reuses these chunks as long as they
+/// are enough.
 ///
-/// The first write to a page costs a page fault and the zeroing of the page (20 ms instead of 0.4 ms for a frame of 6
-/// megabytes). If the file system is full at that time, the kernel kills the process with SIGBUS. This function pays the cost
-/// in advance and reports the failure.
+/// The first write to a page costs a page fault and the zeroing of the page (20 ms instead of 0.4 ms for a frame of 6 megabytes). If the
+/// file system is full at that time, the kernel kills the process with SIGBUS. With this function, the cost occurs in advance, and a full
+/// file system is reported as an error.
 ///
 /// * `port`: number of the publisher in iceoryx2, which is part of its pool's file name.
 /// * `mapped`: number of mapped chunks, and number of all chunks.
@@ -139,7 +139,8 @@ pub(crate) fn refused(prefix: &str) -> Option<MemoryError> {
 }
 
 impl Mapping<'_> {
-    /// Maps the given share of the pages, from the first one. A kernel before 5.14 does not support this, which does no harm.
+    /// Maps the given fraction of the pages, starting at the first page. Kernels before 5.14 do not support this; the pages are then mapped
+    /// when they are first used.
     fn touch(&self, [share, of]: [usize; 2]) {
         let len = if share < of {
             self.len / of * share

@@ -1,4 +1,4 @@
-//! Location of a deployment's shared memory and files, which separates deployments from each other.
+//! Location of a deployment's shared memory and files. Different deployments have different locations.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use iceoryx2::prelude::{FileName, Path as IoxPath, SemanticString as _};
 
 use failure::{ExitKind, Fault};
 
-/// Length of the longest file name that iceoryx2 creates below the root: `/`, 39 digits, `.event`.
+/// Length of the longest file name that iceoryx2 creates in the root directory: `/`, 39 digits, `.event`.
 const SOCKET_NAME_LEN: usize = 1 + 39 + 6;
 /// Bytes of `sun_path` without the closing NUL (unix(7)).
 const SOCKET_PATH_MAX: usize = 107;
@@ -57,9 +57,9 @@ impl Fault for NamespaceError {
 
 /// The name of a deployment, with the directory and the prefix that separate it from other deployments.
 ///
-/// Files are in `root`, and shared memory is under `/dev/shm/<prefix>*`. Both depend only on the user, the name
-/// and the directory. Every process of a deployment therefore computes the same locations, and the next run finds the files of a
-/// killed one. Creating a `Namespace` creates no file.
+/// Files are in `root`, and shared memory is under `/dev/shm/<prefix>*`. Both depend only on the user, the name and the directory. Every
+/// process of a deployment therefore computes the same locations, and the next run finds the files that a killed run left behind. Creating
+/// a `Namespace` creates no file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Namespace {
     name: String,

@@ -1,4 +1,4 @@
-//! Observation of a running deployment from a process that is not part of it.
+//! Observes a running deployment from a process that is not part of it.
 
 use core::time::Duration;
 use std::io;
@@ -19,7 +19,7 @@ const PAUSE: Duration = Duration::from_millis(20);
 /// Reason why a deployment cannot be observed.
 #[derive(Debug, thiserror::Error)]
 pub enum ObserverError {
-    /// The deployment does not run, or is about to end.
+    /// The deployment is not running, or is about to end.
     #[error("deployment {name:?} does not run")]
     NotRunning {
         /// Name of the deployment.
@@ -80,8 +80,7 @@ pub struct ObservedProcess<'a> {
 
 /// Observes a running deployment: its processes, which of them are alive, and their metrics.
 ///
-/// The deployment ends without waiting for observers. The observer has to leave within a second after the end
-/// ([`Self::is_over`]).
+/// The deployment ends without waiting for observers. The observer must be dropped within a second after the end ([`Self::is_over`]).
 #[derive(Debug)]
 pub struct Observer {
     processes: Vec<Watched>,
@@ -194,8 +193,8 @@ pub fn wait_for_description(namespace: &Namespace, patience: Duration) -> bool {
     }
 }
 
-/// Returns `error` if the deployment still runs. Otherwise returns `not_running`, because the end of the deployment caused the
-/// error.
+/// Returns `error` if the deployment is still running. Otherwise, returns `not_running`, because the error was caused by the end of the
+/// deployment.
 ///
 /// * The first argument is the deployment and the supervisor that it had.
 pub(crate) fn unless_over<E>(

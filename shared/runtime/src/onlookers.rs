@@ -1,4 +1,4 @@
-//! The subscribers of a topic that its publisher does not wait for.
+//! The subscribers of a topic for which its publisher does not wait.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -7,7 +7,7 @@ use iceoryx2::prelude::{CallbackProgression, PortFactory as _};
 use crate::erased::Messages;
 use crate::subscriber::onlooker;
 
-/// The onlookers of a topic, shared with the handler that decides the action if a receiver has no room.
+/// The onlookers of a topic. They are shared with the handler that decides what to do if a receiver has no room.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Onlookers {
     ids: Arc<Mutex<Vec<u128>>>,

@@ -1,4 +1,4 @@
-//! Types that may be sent: plain data without pointers.
+//! Types that can be sent: plain data without pointers.
 
 use core::fmt::Debug;
 

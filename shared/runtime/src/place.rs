@@ -1,4 +1,4 @@
-//! Notes of a process in a file beside the deployment's sockets, so that they survive the process.
+//! Data that a process writes to a file beside the deployment's sockets (its notes), so that they survive the process.
 
 use std::fs::File;
 use std::io;
@@ -9,8 +9,8 @@ use formats::checksum::fnv1a;
 
 use crate::Bus;
 
-/// Size of the room for one note. The file has room for two notes, which are written alternately. If a process is killed while it
-/// writes one note, the other note is still complete.
+/// Size of the space for one note. The file has space for two notes, which are written alternately. If a process is killed while it writes
+/// one note, the other note is still complete.
 const SLOT_BYTES: u64 = 1 << 18;
 /// Size of the header before each note: its number, its length and its checksum.
 const HEADER_BYTES: usize = 3 * size_of::<u64>();
@@ -24,7 +24,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Creates notes in a file. The first note creates the file.
+    /// Creates notes in a file. The file is created when the first note is written.
     pub fn new(path: PathBuf) -> Self {
         Self {
             path,
@@ -39,7 +39,8 @@ impl Place {
         Self::new(bus.namespace().root().join(file))
     }
 
-    /// Returns the bytes of the last note, possibly from before a restart; `None` if there is no note. The next note follows this one.
+    /// Returns the bytes of the last note, possibly from before a restart; `None` if there is no note. The next note gets the number after
+    /// that of this note.
     pub fn last(&mut self) -> Option<Vec<u8>> {
         let file = File::open(&self.path).ok()?;
         let notes = [0, 1].into_iter().filter_map(|slot| read(&file, slot));

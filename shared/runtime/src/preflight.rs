@@ -1,4 +1,4 @@
-//! Check that there is room for the topics of a deployment, and the topics of every process.
+//! Checks that there is room for the topics of a deployment, and lists the topics that every process has.
 
 use std::io;
 
@@ -13,7 +13,7 @@ use failure::{ExitKind, Fault};
 const ONLOOKERS: usize = 4;
 /// Number of open files of every process, not counting the files of its topics.
 const DESCRIPTORS: u64 = 40;
-/// Number of open files per topic in the process that keeps the topic alive; 6.6 were measured.
+/// Number of open files per topic, in the process that keeps the topic alive. 6.6 files per topic were measured.
 const DESCRIPTORS_A_TOPIC: u64 = 7;
 
 /// Smallest stack of the main thread, in bytes.
@@ -93,8 +93,8 @@ pub fn process_topics(process: &str) -> [TopicPlan; 2] {
     [health.without_wake_up(), metrics.without_wake_up()]
 }
 
-/// Checks that the pools of all topics fit into the free part of `/dev/shm`. Also checks that the supervisor, which has all
-/// topics open, may open enough files.
+/// Checks that the pools of all topics fit into the free part of `/dev/shm`. Also checks that the supervisor, which keeps all topics open,
+/// is allowed to open enough files.
 ///
 /// # Errors
 ///

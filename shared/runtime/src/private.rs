@@ -1,5 +1,4 @@
-//! A deployment belongs to one user: its directory is owned by the user, closed to others, and contains a
-//! marker file.
+//! A deployment belongs to one user: its directory is owned by this user, is not accessible to others, and contains a marker file.
 
 use std::ffi::CString;
 use std::fs::{self, DirBuilder};
@@ -30,7 +29,7 @@ pub(crate) const LOCK_FILE: &str = "lock";
 /// The marker file, which names the deployment that a directory belongs to.
 const MARK_FILE: &str = "parallax-deployment";
 
-/// Reason why the files of a deployment are not private: they belong to another user, or cannot be closed to others.
+/// Reason why the files of a deployment are not private: they belong to another user, or others cannot be denied access.
 #[derive(Debug, thiserror::Error)]
 pub enum PrivacyError {
     /// The file or directory belongs to another user.
@@ -133,8 +132,7 @@ impl Root {
     /// Creates the directory of a deployment if it does not exist, and checks that it belongs to this user.
     /// Its mode is 0700 afterwards, regardless of the umask.
     ///
-    /// The parent directory must belong to this user or root, and other users must not be able to replace its
-    /// entries.
+    /// The parent directory must belong to this user or to root, and other users must not be able to replace its entries.
     pub(crate) fn open(namespace: &Namespace) -> Result<Self, PrivacyError> {
         let path = namespace.root();
         loop {
@@ -200,8 +198,7 @@ impl Root {
         Ok(())
     }
 
-    /// Removes the marker file, the lock file (which this process holds) and the directory, unless the next run has
-    /// started in it.
+    /// Removes the marker file, the lock file (which is locked by this process) and the directory, unless the next run has started in it.
     ///
     /// The lock file is removed last, so that no other run can start earlier.
     pub(crate) fn remove(&self, namespace: &Namespace) -> io::Result<()> {
@@ -308,8 +305,8 @@ fn unopened(path: &Path, error: Errno) -> PrivacyError {
     }
 }
 
-/// Checks that no shared memory file with the prefix of a deployment belongs to another user, and closes these files
-/// to others. iceoryx2 leaves its management file writable for all users.
+/// Checks that no shared memory file with the prefix of a deployment belongs to another user, and denies others access to these files.
+/// iceoryx2 leaves its management file writable for all users.
 pub(crate) fn shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         let is_file = FileType::from_raw_mode(found.st_mode) == FileType::RegularFile;
@@ -365,7 +362,7 @@ fn each_segment(
     Ok(())
 }
 
-/// Closes a directory to others.
+/// Denies others access to a directory.
 fn shut(directory: &OwnedFd, found: &Stat, path: &Path) -> Result<(), PrivacyError> {
     if found.st_mode & 0o7777 == DIRECTORY.bits() {
         return Ok(());

@@ -12,7 +12,7 @@ use failure::{DEFECT, ExitKind, Failure, Stop, init_logging, log_panics, panic_t
 
 use crate::{Bus, Delivery, Health, Launch, Patience, Progress};
 
-/// Tools of a service: the bus for its ports, its stop request and its counters.
+/// What a service can use: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
 pub struct Service {
     bus: Bus,
@@ -63,11 +63,11 @@ impl Service {
 
     /// Returns the time to wait for receivers before the first message.
     ///
-    /// All processes of a deployment start at the same time, but some take longer than others. A restarted process finds the other
-    /// processes already running. With lossless delivery, a late receiver would miss earlier messages. A sender therefore waits for
-    /// receivers to start as long as it waits for room.
+    /// All processes of a deployment are started at the same time, but some take longer than others to start. When a process is restarted,
+    /// the others are already running. With lossless delivery, a late receiver would miss earlier messages. A sender therefore waits for
+    /// receivers to start for as long as it would wait for room.
     ///
-    /// * `deadline`: the patience after the start, and for receivers that were given up.
+    /// * `deadline`: how long to wait after the start-up phase, and for receivers that were given up.
     pub fn patience_at_start(&self, deadline: Duration) -> Patience {
         let limit = match (self.launch.epoch, self.launch.delivery) {
             (0, Delivery::Lossless) => deadline.max(self.bus.patience()),
@@ -81,7 +81,7 @@ impl Service {
     }
 }
 
-/// Time that the processes of a deployment may take to find each other at start-up.
+/// Time within which the processes of a deployment should find each other at start-up.
 const BEGINNING: Duration = Duration::from_secs(10);
 
 /// Runs a service in this process and returns its exit status.

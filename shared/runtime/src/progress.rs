@@ -6,9 +6,9 @@ use std::sync::{Arc, OnceLock};
 
 /// Counts iterations of a process's main loop. Clones share the count.
 ///
-/// Waiting for messages, waiting for a slow receiver and sending are counted automatically. A computation
-/// that may take seconds must call [`tick`](Self::tick) repeatedly. If it counts its own steps, it can be
-/// [followed](Self::follow) instead. Otherwise, the supervisor assumes that the process hangs.
+/// Waiting for messages, waiting for a slow receiver and sending are counted automatically. A computation that may take seconds must call
+/// [`tick`](Self::tick) repeatedly. If it counts its own steps, it can be [followed](Self::follow) instead. Without either, the supervisor
+/// assumes that the process hangs.
 #[derive(Clone, Default)]
 pub struct Progress {
     count: Arc<AtomicU64>,

@@ -103,7 +103,7 @@ impl Fault for SendError {
 }
 
 impl SendError {
-    /// Returns true if the only reason is a stop request.
+    /// Returns true if sending failed only because of a stop request.
     pub fn is_stopped(&self) -> bool {
         matches!(self, Self::Stopped { .. })
     }
@@ -182,7 +182,7 @@ impl<E: Element, H: Header> SlicePublisher<E, H> {
     /// Waits for `n` subscribers. With [`Delivery::Lossless`], also waits until they have acknowledged this
     /// publisher, because messages that do not fit into their buffers are lost before that.
     ///
-    /// Returns the number of subscribers, which is less than `n` if the patience is over or stop is requested.
+    /// Returns the number of subscribers, which is less than `n` if the time limit has passed or stop is requested.
     pub fn wait_for_subscribers(&self, n: usize, patience: impl Into<Patience>) -> usize {
         self.port.wait_for_subscribers(n, patience.into())
     }
@@ -226,7 +226,7 @@ struct Port {
     delivery: Delivery,
     writer: Writer,
     notifier: Option<Notifier<ipc::Service>>,
-    /// The subscribers that are not waited for.
+    /// The subscribers for which this publisher does not wait.
     onlookers: Onlookers,
     /// Receives the acknowledgements of subscribers.
     ready: Option<Listener<ipc::Service>>,
@@ -438,7 +438,7 @@ impl Port {
                 return ready;
             }
             self.progress.tick();
-            // Wakes earlier subscribers, so that they connect.
+            // Wakes the subscribers that already exist, so that they connect.
             if let Some(notifier) = &self.notifier
                 && let Err(error) = notifier.notify()
             {
@@ -454,8 +454,8 @@ impl Port {
 const LEAST_PAUSE: Duration = Duration::from_micros(50);
 const MOST_PAUSE: Duration = Duration::from_millis(1);
 
-/// Returns the action if a receiver has no room: wait until the patience is over or stop is requested. If the receiver is an
-/// onlooker, it misses the message.
+/// Returns what to do if a receiver has no room: wait until the time limit has passed or stop is requested. If the receiver is an onlooker,
+/// it misses the message instead.
 fn patience(
     bus: &Bus,
     onlookers: &Onlookers,

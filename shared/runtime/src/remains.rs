@@ -41,10 +41,9 @@ impl Remains {
     }
 }
 
-/// Returns the deployments below a directory, by name. Changes nothing.
+/// Returns the deployments below a directory, sorted by name. Changes nothing.
 ///
-/// * `base`: the directory, as for [`Namespace::below`]. The directory of [`Namespace::new`] is
-///   [`Namespace::usual_base`].
+/// * `base`: the directory, as for [`Namespace::below`]. For deployments of [`Namespace::new`], it is [`Namespace::usual_base`].
 ///
 /// # Errors
 ///
@@ -163,7 +162,7 @@ mod tests {
         let base = base();
         let lives = Namespace::below("lives", base.path()).unwrap();
         let lock = lives.acquire().unwrap();
-        // A killed supervisor leaves its lock file and others.
+        // A killed supervisor leaves its lock file and other files behind.
         let dead = base.path().join("dead");
         let marked = Namespace::below("dead", base.path()).unwrap();
         private::Root::open(&marked).unwrap();

@@ -1,4 +1,4 @@
-//! Room in shared memory: the memory that a process needs in addition to its topics, and a remedy if there is not enough.
+//! Free space in shared memory: the memory that a process needs in addition to its topics, and what to do if there is not enough.
 
 use core::sync::atomic::{AtomicU64, Ordering};
 
@@ -11,10 +11,10 @@ use crate::reserve::{Refused, n_refused, refused};
 /// Memory for queues and management of one process, in bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
-/// Remedy if there is no room.
+/// What to do if there is not enough space.
 pub(crate) const ROOM: &str = "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
 
-/// If there was no room for a segment, returns a text with the requested size, the free size, and a remedy.
+/// If there was no room for a segment, returns a text with the requested size, the free size, and what to do.
 pub(crate) fn no_room() -> Option<String> {
     let kilobytes = |bytes: u64| bytes.div_ceil(1000);
     Some(match refused()? {
@@ -35,8 +35,8 @@ pub(crate) fn no_room() -> Option<String> {
 /// Free memory at the last failure of the transport, in bytes; the maximum value if nothing has failed.
 static FREE_AT_FAILURE: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Records the free memory at a failure of the transport, which need not state its reason. Call this at once: the failed operation
-/// releases its memory, and a moment later there may be room again.
+/// Records how much memory is free when the transport fails, because the failure may not state its reason. Call this at once: the failed
+/// operation releases its memory, so that a moment later there may be room again.
 pub(crate) fn note_room<E>(_: &E) {
     let free_bytes = free_shared_memory().unwrap_or(u64::MAX);
     FREE_AT_FAILURE.store(free_bytes, Ordering::Relaxed);
@@ -53,10 +53,10 @@ pub(crate) fn short_of_room() -> Option<String> {
         .or_else(|| short("are", free_shared_memory().ok()?))
 }
 
-/// Returns the action of a port that cannot connect to another port.
+/// Returns what a port does if it cannot connect to another port.
 ///
-/// iceoryx2 tries to connect only once. If there is no room, the port fails, because sender and receiver would otherwise wait for
-/// each other forever. Any other reason means that the other port has just ended.
+/// iceoryx2 tries to connect only once. If the reason is a lack of memory, the port fails, because sender and receiver would otherwise wait
+/// for each other forever. Any other reason means that the other port has just ended.
 pub(crate) fn connections()
 -> impl Fn(DegradationCause, &DegradationInfo) -> DegradationAction + Send + 'static {
     let known = AtomicU64::new(n_refused());

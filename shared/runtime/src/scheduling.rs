@@ -17,16 +17,16 @@ use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 pub use denied::{Denied, Refusal};
 pub use text::SchedulingError;
 
-/// Requests of a process to the system's scheduler. The default requests nothing.
+/// Settings that a process requests from the system's scheduler. The default requests nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Scheduling {
-    /// Cores that the process may run on, numbered from 0 as in Linux. If empty, the cores on which it was started.
+    /// Cores on which the process may run, numbered from 0 as in Linux. If empty, the process may use the same cores as its parent.
     pub cores: Vec<usize>,
     /// Priority above all processes without real-time priority.
     pub real_time: Option<RealTime>,
     /// Keep used pages in memory (`mlockall`).
     pub lock_memory: bool,
-    /// Poll for messages without pause instead of sleeping until one arrives.
+    /// Poll for messages continuously, instead of sleeping until one arrives.
     pub spin: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct Scheduling {
 pub struct RealTime {
     /// The order among threads of the same priority.
     pub policy: Policy,
-    /// Priority from 1 to 99; the process with the highest one runs.
+    /// Priority from 1 to 99; among processes that are ready to run, the one with the highest priority runs.
     pub priority: u8,
 }
 
@@ -67,8 +67,8 @@ impl Scheduling {
         [self.apply_to_thread(), memory.into_iter().collect()].concat()
     }
 
-    /// Returns the result that [`apply`](Self::apply) would have in a process that this process starts. A short-lived
-    /// thread tries the requests, so that this process does not change.
+    /// Returns the requests that would be denied if a process started by this process called [`apply`](Self::apply). A short-lived thread
+    /// tries the requests, so that this process does not change.
     pub fn rehearse(&self) -> Vec<Denied> {
         let wanted = self.clone();
         let thread = thread::Builder::new().name("rehearsal".to_owned());
@@ -154,7 +154,7 @@ pub fn own_cores() -> io::Result<Vec<usize>> {
 /// Locks all pages, present and future, into memory.
 fn lock_memory() -> Option<Denied> {
     if let Some(limit_bytes) = memory_limit() {
-        // With a limit, the call would succeed now, but a later allocation would fail.
+        // With a limit on locked memory, the call would succeed now, but a later allocation would fail.
         return Some(Denied::Memory {
             limit_bytes: Some(limit_bytes),
             source: io::ErrorKind::PermissionDenied.into(),
@@ -182,12 +182,12 @@ fn has_capability(status: &str, capability: u32) -> bool {
     mask.is_some_and(|mask| mask >> capability & 1 == 1)
 }
 
-/// Nice value of an onlooker, which gives it two fifths of the share of an ordinary process. With a smaller share, it would see
-/// nothing of a run that takes all processors.
+/// Nice value of an onlooker. It gives the onlooker two fifths of the processor time of an ordinary process. With less, the onlooker could
+/// not follow a run that uses all processors.
 const WAY: i32 = 4;
 
-/// Lowers the priority of this thread, and of the threads that it starts, so that other processes go first if processors are scarce.
-/// Call this before threads are started; it cannot be undone.
+/// Lowers the priority of this thread, and of the threads that it starts, so that other processes run first if processors are scarce. Call
+/// this before any thread is started; it cannot be undone.
 pub fn give_way() {
     if let Err(error) = nice(WAY) {
         tracing::debug!(%error, "cannot give way to other processes");
@@ -198,7 +198,7 @@ pub fn give_way() {
 mod tests {
     use super::*;
 
-    /// Runs on a separate thread, because the scheduling of a thread stays changed.
+    /// Runs a function on a separate thread, because the scheduling of a thread stays changed.
     fn on_a_thread<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> T {
         let thread = thread::Builder::new().spawn(body).unwrap();
         thread.join().unwrap()

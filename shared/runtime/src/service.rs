@@ -41,7 +41,7 @@ const WAKES: &str = "parallax.wakes";
 /// The wake-up of a topic in one process.
 pub(crate) type WakeUp = EventFactory<ipc::Service>;
 
-/// Reason why a port of a topic cannot be created.
+/// Reason why a port of a topic cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum PortError {
     /// The topic does not exist.
@@ -204,7 +204,7 @@ pub(crate) fn open_wake_up(node: &Node<ipc::Service>, name: &str) -> Result<Wake
     })
 }
 
-/// The parts of a topic's plan for which iceoryx2 has no field.
+/// The parts of a topic's plan that iceoryx2 has no field for.
 pub(crate) struct Extras {
     /// Maximum length of an array, in elements.
     pub(crate) max_len: usize,

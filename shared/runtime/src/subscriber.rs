@@ -38,12 +38,12 @@ pub enum ReceiveError {
         #[source]
         source: IoxReceiveError,
     },
-    /// The end of the stream was refused. It will not be sent again.
+    /// The message that ends a stream was rejected. It will not be sent again.
     #[error("the end of a stream of {name} is not accepted: {why}")]
     End {
         /// Name of the message type.
         name: &'static str,
-        /// Reason for the refusal.
+        /// Reason for the rejection.
         why: String,
     },
 }
@@ -74,8 +74,8 @@ impl<T: Message> Subscriber<T> {
         self.receive_by(|message| *message)
     }
 
-    /// Takes the oldest waiting message, if there is one, and reads it in the memory of its sender. Meant for messages that are too large
-    /// for a stack.
+    /// Takes the oldest waiting message, if there is one, and calls `read` with the message in the memory of its sender. Meant for messages
+    /// that are too large for a stack.
     ///
     /// # Errors
     ///
@@ -160,15 +160,14 @@ impl<E: Element, H: Header> SliceSubscriber<E, H> {
             match self.receive() {
                 Ok(Some(sample)) => latest = Some(sample),
                 Ok(None) => return Ok(latest),
-                // A newer array was sent since the last check.
+                // A newer array has arrived since the last check.
                 Err(ReceiveError::TooManyHeld { .. }) if latest.is_some() => latest = None,
                 Err(error) => return Err(error),
             }
         }
     }
 
-    /// Copies an array, for use after its sender needs the memory again. The copy is counted
-    /// ([`Bus::copies`]).
+    /// Copies an array, for use after its sender needs the memory again. The copy is counted in [`Bus::copies`].
     pub fn copy_of(&self, sample: &Sample<E, H>) -> Vec<E> {
         self.port.copies.add(size_of_val(sample.payload()));
         sample.payload().to_vec()
@@ -262,7 +261,7 @@ impl Port {
             Delivery::Realtime | Delivery::Lossless => None,
         };
         if bus.looks_on() {
-            // The subscriber polls, so that no sender has to wake it.
+            // The subscriber polls, because no sender should have to wake it.
         } else if waiter.spins() {
             // A spinning waiter needs no wake-up.
             waiter.poll_without_pause();

@@ -10,8 +10,8 @@ use crate::erased::{Messages, Types};
 use crate::payload::{Element, Header, Message};
 use crate::service::{Extras, WakeUp, patiently, ready_name};
 
-/// Maximum number of processes that may open one topic. It is larger than the number of processes of a deployment, because dead
-/// processes count until they are cleaned up.
+/// Maximum number of processes that may open one topic. It is larger than the number of processes in a deployment, because dead processes
+/// count until they are cleaned up.
 const MAX_NODES: usize = 96;
 /// Maximum number of ports of one wake-up: the maximum number of views of a process, with spare slots for dead ports.
 const MAX_WAKE_UP_PORTS: usize = 64;
@@ -72,7 +72,7 @@ impl TopicPlan {
         }
     }
 
-    /// Omits the wake-up: receivers of this topic poll it.
+    /// Creates the topic without a wake-up; its receivers poll.
     #[must_use]
     pub fn without_wake_up(mut self) -> Self {
         self.wakes = false;
@@ -127,7 +127,7 @@ impl TopicPlan {
         needed + self.onlooked_chunks()
     }
 
-    /// Returns the number of chunks that onlookers may hold back from their publisher.
+    /// Returns the number of chunks that onlookers may keep their publisher from reusing.
     fn onlooked_chunks(&self) -> usize {
         self.limits.onlookers * (self.limits.buffer + 1)
     }
@@ -143,7 +143,7 @@ impl TopicPlan {
         self.chunk_bytes as u64
     }
 
-    /// Returns the size of the shared memory of all publishers of the topic, in bytes. The result saturates.
+    /// Returns the size of the shared memory of all publishers of the topic, in bytes; the maximum value if the size overflows.
     pub fn pool_bytes(&self) -> u64 {
         let chunks = (self.limits.publishers as u64).saturating_mul(self.chunks() as u64);
         chunks.saturating_mul(self.chunk_bytes as u64)

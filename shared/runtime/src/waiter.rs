@@ -20,12 +20,12 @@ use crate::room::note_room;
 use crate::service::{self, PortError};
 use failure::{Fault, Stop};
 
-/// Longest sleep. A sender may die between sending and notifying, so receivers have to check on their own.
-/// A process that sleeps for longer would also seem to hang.
+/// Longest sleep. A sender may die after sending a message and before notifying, so receivers have to check for messages even without a
+/// notification. A process that sleeps for longer would also seem to hang.
 const LONGEST_SLEEP: Duration = Duration::from_millis(100);
 
-/// Number of iterations after which a spinning waiter yields its core. It is large enough to cost a message less than a
-/// tenth of a microsecond on average.
+/// Number of iterations after which a waiter that polls continuously yields its core. It is so large that yielding costs less than a tenth
+/// of a microsecond per message on average.
 const ITERATIONS_BETWEEN_YIELDS: u32 = 64;
 
 /// Reason why [`Waiter::wait`] returned.
@@ -52,7 +52,7 @@ pub struct Waiter {
     listeners: Vec<Listener<ipc::Service>>,
     stop: Stop,
     progress: Progress,
-    /// True if the waiter spins instead of sleeping while there are subscribers.
+    /// True if the waiter polls continuously instead of sleeping while there are subscribers.
     spins: bool,
     /// True if there are subscribers.
     has_ports: bool,
@@ -102,7 +102,7 @@ impl Waiter {
         self.sleep(timeout)
     }
 
-    /// Lets the caller poll without a pause.
+    /// Returns at once, so that the caller polls continuously.
     fn turn(&self) -> Woken {
         self.progress.tick();
         if self.stop.is_requested() {
@@ -118,7 +118,7 @@ impl Waiter {
         Woken::Time
     }
 
-    /// Sleeps until a message arrives, even if the bus spins.
+    /// Sleeps until a message arrives, even if the bus is set to poll continuously.
     fn sleep(&self, timeout: Duration) -> Result<Woken, WaitError> {
         self.progress.tick();
         if self.stop.is_requested() {

@@ -1,4 +1,4 @@
-//! All ports of a whole deployment at once.
+//! Opens all ports of a whole deployment at once.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
@@ -27,7 +27,7 @@ fn processes() -> Vec<String> {
         .collect()
 }
 
-/// Room for exactly the ports that the test opens.
+/// Returns topics with room for exactly the ports that the test opens.
 fn topics(delivery: Delivery) -> Vec<TopicPlan> {
     let large = |receivers| Limits::new(receivers, 1, 2);
     let small = |receivers| Limits::new(receivers, 8, 2);
@@ -115,7 +115,7 @@ impl Ports {
         self.pairs_out.push(bus.publisher(&topic::pair_pose(worker)).unwrap());
     }
 
-    /// Opens the ports of `triangulate`, which publishes the result, and of `record`, which receives everything.
+    /// Opens the ports of the service `triangulate`, which publishes the result, and of `record`, which receives everything.
     fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
         for view in 0..N_VIEWS {
             self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());

@@ -14,7 +14,7 @@ const SOON: Duration = Duration::from_secs(20);
 /// Number of elements of every array, with enough bytes to distinguish chunks by their pages.
 const LEN: usize = 1 << 20;
 
-/// Returns a plan with one chunk to write and one to borrow. The worst case would need nine.
+/// Returns a plan with one chunk for writing and one for borrowing. The worst case would need nine chunks.
 fn plan(delivery: Delivery) -> TopicPlan {
     let limits = Limits::new(2, 2, 2);
     TopicPlan::slices::<u8, FrameHeader>("large".to_owned(), delivery, limits, LEN)
@@ -83,7 +83,7 @@ fn a_sender_waits_until_a_chunk_is_released() {
     let begin = Instant::now();
     while got.len() < usize::from(N) && begin.elapsed() < Duration::from_mins(1) {
         waiter.wait(SOON).unwrap();
-        // A sample is held until the next one has arrived, as fusion may do.
+        // Each sample is held until the next one has arrived, as fusion may do.
         while let Some(sample) = subscriber.receive().unwrap() {
             let value = sample.payload()[0];
             assert!(

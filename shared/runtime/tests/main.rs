@@ -1,4 +1,4 @@
-//! Ports and deployments within one process: one binary, because linking takes longer than most tests.
+//! Tests of ports and deployments within one process. They are in one binary, because linking takes longer than most tests.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod common;

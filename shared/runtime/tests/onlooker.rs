@@ -1,4 +1,4 @@
-//! An onlooker does not slow down senders and receivers, however slow it is itself.
+//! Tests that an onlooker does not slow down senders and receivers, however slow it is itself.
 
 use core::time::Duration;
 use std::time::Instant;
@@ -7,7 +7,7 @@ use crate::common::Deployment;
 use messages::{FrameHeader, ViewQuality};
 use runtime::{Delivery, Limits, TopicPlan, Woken};
 
-/// A sender that waits for an onlooker would wait for two minutes.
+/// Limit that shows that no sender waits for an onlooker, because such a wait would take two minutes.
 const NOT_STUCK: Duration = Duration::from_mins(1);
 
 fn quality(frame: u64) -> ViewQuality {

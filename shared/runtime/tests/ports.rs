@@ -197,7 +197,7 @@ fn a_receiver_that_was_given_up_is_waited_for_no_longer_than_later_on() {
         limit: Duration::from_millis(300),
         after_losses: Duration::from_millis(1),
     };
-    // Two receivers are missing, and one was given up. The publisher waits for the other one.
+    // Two receivers are missing, one of which was given up. The publisher waits for the other one.
     assert_eq!(publisher.wait_for_subscribers(2, patience), 0);
     assert!(begin.elapsed() >= patience.limit);
     patience.limit = Duration::from_hours(1);

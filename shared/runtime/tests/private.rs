@@ -199,7 +199,7 @@ fn home(base: &Path, name: &str) -> PathBuf {
     }
     fs::create_dir(home.join("photos")).unwrap();
     fs::write(home.join("photos/one.jpg"), "x").unwrap();
-    // The mode is set explicitly, because another test may have changed the umask, and a base that others may write to would be closed.
+    // The mode is set explicitly, because another test may have changed the umask, and a base that others can write to would be rejected.
     fs::set_permissions(&home, Permissions::from_mode(0o755)).unwrap();
     home
 }

@@ -1,5 +1,4 @@
-//! The slots of a killed process are released, even if several processes clean up at once or are killed during
-//! the clean-up.
+//! Tests that the slots of a killed process are released, even if several processes clean up at once or are killed during the clean-up.
 //!
 //! This executable also runs as the processes that are killed, so it has no test harness.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
@@ -30,7 +29,7 @@ fn main() {
         Some("role:unfinished") => {
             a_slot_is_released_if_its_owner_left_incomplete_files();
         }
-        // A process cleans up in only one deployment, as a supervisor does.
+        // Each process cleans up in only one deployment, as a supervisor does.
         _ => ["role:in-vain", "role:unfinished"].into_iter().for_each(passes),
     }
 }

@@ -1,4 +1,4 @@
-//! A receiver that polls without pause gets the same messages, and its sender sends no wake-up.
+//! Tests that a receiver that polls continuously gets the same messages, and that its sender sends no wake-up.
 
 use crate::common;
 
@@ -50,7 +50,7 @@ fn a_spinning_receiver_gets_all_messages() {
             let port = bus.slice_subscriber::<u8, FrameHeader>(TOPIC, &mut waiter).unwrap();
             let (mut received, begin) = (Vec::new(), Instant::now());
             while received.len() < 100 && begin.elapsed() < WATCHDOG {
-                // The waiter does not sleep, so the reason for returning is always time.
+                // The waiter does not sleep, so it always returns because of the time limit.
                 assert_eq!(waiter.wait(WATCHDOG).unwrap(), Woken::Time);
                 if let Some(sample) = port.receive().unwrap() {
                     received.push(sample.payload()[0]);

@@ -1,16 +1,16 @@
-//! Human bodies: how long people's bones are, and how this limits a skeleton found in space.
+//! Human bodies: how long people's bones are, and what this means for a skeleton found in 3D.
 //!
-//! The pictures show where joints may be; this module decides which of these joints can belong to a person. It knows the lengths of bones
-//! as shares of the stature, with their spread among people and the published source of every number ([`Kind::proportion`]). It answers
-//! five questions:
+//! The pictures show where joints may be; this module decides which of these joints can belong to a person. It contains the lengths of
+//! bones as fractions of the stature, with their spread among people and the published source of every number ([`Kind::proportion`]). It
+//! answers five questions:
 //!
 //! | question | answer |
 //! |---|---|
 //! | how tall is the person? | [`stature`] |
 //! | is this skeleton a person, and which joints are impossible? | [`check`] |
-//! | which of many starts looks most like a person? | [`deviation`]: cheap, for many calls per frame |
+//! | which of many candidate skeletons is most like a person? | [`deviation`]: fast enough for many calls per frame |
 //! | how long are the bones of this individual? | [`Lengths`], learned over a run |
-//! | where are the joints, if bones keep their lengths? | [`refine`]: a soft prior in triangulation |
+//! | where are the joints, given that bones keep their lengths? | [`refine`]: a soft prior in triangulation |
 //!
 //! The joints are the 14 joints of `crate::PARSE14` in its order, in metres in the world. A joint that is not finite, or
 //! farther than 1000 km from the origin, is treated as missing. The functions do not use the vertical, so a body may also lie or
@@ -18,10 +18,11 @@
 //!
 //! # What is published, and what is our own choice
 //!
-//! Published: the shares of the stature and their spread among adults, and the statures of adults and children. Our own choice: the shares
-//! of a small child (derived from published data, see [`Kind::proportion`]), the differences between detectors and data sets in placing a
-//! joint ([`Proportion::place`]), the effect of posture ([`Proportion::posture`]), and the error of a measured length ([`MEASUREMENT_SD`]).
-//! The limits are deliberately wide: the detector's error is 5 to 15 cm, and joints that count as impossible are removed.
+//! These numbers are published: the bone lengths of adults as fractions of the stature, their spread among adults, and the statures of
+//! adults and children. The others are our own choice: the bone lengths of a small child (derived from published data, see
+//! [`Kind::proportion`]), the differences between detectors and data sets in the position of a joint ([`Proportion::place`]), the effect of
+//! posture ([`Proportion::posture`]), and the error of a measured length ([`MEASUREMENT_SD`]). The limits are wide on purpose, because the
+//! detector's error is 5 to 15 cm, and joints that count as impossible are removed.
 
 mod bone;
 mod check;

@@ -1,11 +1,11 @@
-//! Joint sets of the data sets, each joint as the mean of one or two part centres.
+//! Joint sets of the data sets; each joint is the mean of one or two part centres.
 
-/// One evaluated joint.
+/// A joint of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Joint {
     /// Name in the data set.
     pub name: &'static str,
-    /// Indices of the parts whose mean centre is the joint, counted from 0.
+    /// Indices of the parts, counted from 0; the mean of their centres is the joint.
     pub parts: &'static [usize],
 }
 
@@ -21,7 +21,7 @@ pub struct JointSet {
 }
 
 impl JointSet {
-    /// The three joint sets, the default first.
+    /// The three joint sets; the default comes first.
     pub const ALL: [&'static Self; 3] = [&PARSE14, &UMPM15, &HUMANEVA20];
 
     /// Returns the joint set with that name, if there is one.

@@ -65,7 +65,7 @@ pub const PARENT: [Option<usize>; N_PARTS] = [
     Some(24),
 ];
 
-/// The part on the other side of the body; head and neck are their own mirror.
+/// The same part on the other side of the body; head and neck map to themselves.
 pub const MIRROR: [usize; N_PARTS] = [
     0, 1, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13,
 ];

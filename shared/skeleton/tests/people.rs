@@ -1,4 +1,4 @@
-//! Tests on the simulated people of `scene` in all their actions: each one must be accepted as a whole person of about the right stature.
+//! Tests on the simulated people of `scene` in all their actions: each must be accepted as a whole person, with about the right stature.
 
 use nalgebra::Point3;
 use scene::{Action, Scene, Settings};

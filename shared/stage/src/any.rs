@@ -1,4 +1,4 @@
-//! Topics of any message type, as bytes. `record` receives such messages and `replay` sends them.
+//! Topics of any message type, as bytes. The service `record` receives such messages, and `replay` sends them.
 
 mod receiver;
 mod sender;

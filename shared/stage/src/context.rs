@@ -7,13 +7,13 @@ use wire::{Expected, WireError};
 
 use crate::Stamped;
 
-/// The counters of a stage. A process reports them in its heartbeats.
+/// The counters of a stage, which its process reports in heartbeats.
 pub trait Account {
     /// Counts a message that was received and accepted.
     fn received(&self);
     /// Counts messages or frames that were lost.
     fn dropped(&self, cause: Cause, n: u64);
-    /// Counts a refused message, and logs the reason.
+    /// Counts a rejected message, and logs the reason.
     fn refused(&self, cause: Refusal, topic: &str, error: &WireError);
 }
 
@@ -85,21 +85,21 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// Counts and logs a refused message that does not end a stream.
+    /// Counts and logs a rejected message that does not end a stream.
     pub fn count_refused(&self, topic: &str, error: &WireError) {
         self.account.refused(error.refusal(), topic, error);
     }
 
-    /// Counts and logs a refused message.
+    /// Counts and logs a rejected message.
     ///
     /// # Errors
     ///
-    /// Returns [`ReceiveError::End`] if the message is the end of a stream of this session, because no other end would follow.
+    /// Returns [`ReceiveError::End`] if the message is the end of a stream of this session, because the end is sent only once.
     pub fn refuse<M: Stamped>(&self, message: &M, error: &WireError) -> Result<(), ReceiveError> {
         self.refuse_end(M::NAME, message.stamp(), message.status(), error)
     }
 
-    /// Works like [`refuse`](Self::refuse), for the header of a bulk message.
+    /// Works like [`refuse`](Self::refuse), for the header of bulk data (large arrays).
     ///
     /// # Errors
     ///

@@ -16,7 +16,7 @@ pub struct Item<T> {
     pub value: T,
 }
 
-/// The stamp of the messages that a stage sends for one frame, and the times for its latency figures.
+/// The stamp of the messages that a stage sends for one frame, and the times from which latencies are computed.
 #[derive(Debug)]
 pub struct Turn {
     stamp: Stamp,
@@ -44,7 +44,7 @@ impl Turn {
         self.received_at.get()
     }
 
-    /// Records that work on the next message begins, because a stage may send several messages for a frame.
+    /// Records that work on the next message begins; a stage may send several messages for a frame.
     pub fn restart(&self, now: u64) {
         self.received_at.set(now);
     }
@@ -81,13 +81,13 @@ impl<T> Frame<'_, T> {
         self.items.get(slot)?.as_ref()
     }
 
-    /// Takes the message of a slot, if it was received in time.
+    /// Takes the message of a slot out of the frame, if it was received in time.
     pub fn take(&mut self, slot: usize) -> Option<Item<T>> {
         self.items.get_mut(slot)?.take()
     }
 
-    /// Returns the message of an optional input, with its age in frames. If there is none for this frame, returns the input's last message
-    /// while it is fresh.
+    /// Returns the message of an optional input, with its age in frames. If there is no message for this frame, returns the last message of
+    /// the input, unless it is too old.
     ///
     /// * `captured_at`: capture time of the view's frame, in nanoseconds.
     pub fn latest(&self, slot: usize, captured_at: u64) -> Option<(u64, &T)> {

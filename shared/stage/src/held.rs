@@ -1,4 +1,4 @@
-//! Bulk data that a stage reads in shared memory.
+//! Bulk data (large arrays) that a stage reads in shared memory.
 
 use core::fmt;
 use std::cell::{Ref, RefCell};

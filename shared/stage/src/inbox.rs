@@ -16,7 +16,7 @@ pub(crate) struct Rules {
     pub(crate) delivery: Delivery,
     /// Maximum time for which an input may be silent while others wait for it.
     pub(crate) patience: Duration,
-    /// Distance between the used frames, if frames may be skipped. The stage then follows a [`Cadence`].
+    /// Distance between the used frames, if frames may be skipped. If so, the stage uses a [`Cadence`].
     pub(crate) skips: Option<u64>,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Inbox<'a, T> {
 impl<'a, T> Inbox<'a, T> {
     /// Creates an inbox.
     ///
-    /// * `remember`: by slot, the function that copies a value for use in later frames (up to `max_age`), if this is allowed.
+    /// * `remember`: for each slot, the function that copies a value for use in later frames (up to `max_age`), if such use is allowed.
     pub(crate) fn new(
         inputs: Vec<Box<dyn Input<T> + 'a>>,
         rules: Rules,
@@ -83,7 +83,7 @@ impl<'a, T> Inbox<'a, T> {
         self.inputs.iter().try_for_each(|input| input.drain())
     }
 
-    /// Returns the next complete frame. If frames may be skipped, returns the latest one of the cadence.
+    /// Returns the next complete frame. If frames may be skipped, returns the latest complete frame that the cadence selects.
     pub(crate) fn next(&mut self, context: &Context<'_>) -> Option<Joined<Item<T>>> {
         let now = context.now();
         let Some(step) = self.skip_step() else {
@@ -119,7 +119,7 @@ impl<'a, T> Inbox<'a, T> {
         self.joins.joiner.n_pending()
     }
 
-    /// Returns true if no frame will follow.
+    /// Returns true if no more frames will follow.
     pub(crate) fn is_over(&self, now: u64) -> bool {
         self.joins.joiner.is_over(now)
     }

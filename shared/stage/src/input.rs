@@ -20,7 +20,7 @@ pub(crate) struct Typed<M, R, D> {
     pub(crate) port: Port<R>,
     pub(crate) slots: Slots,
     pub(crate) decode: D,
-    /// Ports that could send at the last check.
+    /// Ports that were able to send at the last check.
     pub(crate) senders: Vec<u128>,
     pub(crate) message: core::marker::PhantomData<fn() -> M>,
 }

@@ -4,7 +4,7 @@ use crate::join::Cadence;
 use messages::{FrameHeader, Status};
 use runtime::Delivery;
 
-/// Maximum gap that counts as lost frames. A larger gap means a wrong frame number.
+/// Largest gap between frame numbers that counts as lost frames. A larger gap means that a frame number is wrong.
 const MAX_GAP: u64 = 1 << 16;
 
 /// Chooses and counts the frames of one view as they arrive.
@@ -25,7 +25,7 @@ pub(crate) struct Past {
     next: u64,
     /// Number of frames that the camera has dropped.
     n_dropped: u64,
-    /// Epoch of the capture process, whose count begins at 0 in every epoch.
+    /// Epoch (number of restarts) of the capture process, whose count begins at 0 in every epoch.
     camera_epoch: u32,
 }
 
@@ -46,7 +46,7 @@ impl Past {
 }
 
 impl Intake {
-    /// Creates an intake.
+    /// Creates an intake, which selects the frames to process.
     ///
     /// * `past`: progress of earlier epochs of this process.
     pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], past: Past) -> Self {
@@ -65,7 +65,7 @@ impl Intake {
         self.past
     }
 
-    /// Returns true if a frame has to be processed. A frame is not processed if it was only sent again for another receiver, or if the
+    /// Returns true if a frame has to be processed. This is not the case if the frame was only sent again for another receiver, or if the
     /// cadence skips it.
     pub(crate) fn takes(&self, header: &FrameHeader) -> bool {
         let frame = header.stamp.frame;
@@ -75,7 +75,8 @@ impl Intake {
                 || self.cadence.takes(self.nth(frame)))
     }
 
-    /// Returns the number of frames before this one (or before the end of stream) that were not received and that capture did not drop.
+    /// Returns the number of lost frames before this one (or before the end of stream): those that were not received although capture did
+    /// not drop them.
     pub(crate) fn n_lost_before(&mut self, header: &FrameHeader) -> u64 {
         let nth = self.nth(header.stamp.frame);
         let skipped = nth.saturating_sub(self.past.next);
@@ -125,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns frame `nth` of footage of which every third frame from 6 on is used, at 10 Hz.
+    /// Returns the header of frame `nth` of footage at 10 Hz, of which every third frame is used, starting at frame 6.
     fn header(nth: u64, n_dropped: u64) -> FrameHeader {
         FrameHeader {
             stamp: Stamp {

@@ -1,8 +1,8 @@
-//! Joins the messages of several inputs about one frame, without ever waiting forever.
+//! Joins the messages of several inputs about one frame; the wait is always limited.
 //!
-//! A frame is complete once every input has sent its message about it, or no such message is expected any more. This is the
-//! case if the input has sent a message about a later frame, if its stream has ended, or if it has been silent for too long and counts
-//! as down. This module does not read a clock: the caller passes the time, so that every rule can be tested without waiting.
+//! A frame is complete once every input has sent its message about it, or is no longer expected to. An input is no longer expected to send
+//! the message if it has sent a message about a later frame, if its stream has ended, or if it has been silent for too long and counts as
+//! down. This module does not read a clock: the caller passes the time, so that every rule can be tested without waiting.
 
 mod cadence;
 mod last;
@@ -21,20 +21,21 @@ pub struct Joined<T> {
     pub items: Vec<Option<T>>,
 }
 
-/// Outcome of pushing a message.
+/// Outcome of adding a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Push {
-    /// The message was accepted and waits for the other inputs.
+    /// The message was accepted, and waits for the messages of the other inputs.
     Taken,
-    /// The frame of the message has already been returned, or the input has already sent a message about it.
+    /// The frame of the message has already been returned, or the input has already sent a message about this frame.
     Late,
     /// Too many frames are pending.
     Full,
 }
 
-/// Maximum number of pending frames. A larger number would be hours of frames, or a sender with wrong frame numbers.
+/// Maximum number of pending frames. More would mean hours of frames, or a sender with wrong frame numbers.
 const MAX_PENDING: usize = 1 << 16;
-/// Time after which a restarted sender, which has forgotten its frames, has sent all its messages about frames that had begun.
+/// Time within which a restarted sender sends its messages about frames that had begun before the restart; after that, it is assumed to
+/// have forgotten the other frames.
 const TAKEN_UP_NANOS: u64 = 1_000_000_000;
 
 /// Collects messages by frame, and returns frames in order.
@@ -44,7 +45,7 @@ pub struct Joiner<T> {
     pending: BTreeMap<u64, Slot<T>>,
     patience_nanos: u64,
     alive_patience_nanos: u64,
-    /// Number below which all frames have been returned.
+    /// All frames below this number have been returned.
     next_frame: u64,
 }
 
@@ -55,15 +56,15 @@ struct Input {
     alive_at: Option<u64>,
     ended: bool,
     down: bool,
-    /// Maximum time for which a frame waits for the input.
+    /// Maximum time for which a frame waits for this input.
     deadline: Option<u64>,
     /// Time at which the sender of the input was restarted.
     restarted_at: Option<u64>,
 }
 
 impl Input {
-    /// Returns true if the input's sender was restarted after a frame began, and has had time to send the messages that it still has about
-    /// the frame.
+    /// Returns true if the sender of the input was restarted after a frame began, and has since had time to send the messages that it still
+    /// has about the frame.
     fn has_forgotten(&self, began_at: u64, now: u64) -> bool {
         self.restarted_at
             .is_some_and(|at| began_at < at && now.saturating_sub(at) >= TAKEN_UP_NANOS)
@@ -71,7 +72,7 @@ impl Input {
 
     /// Returns true if the input has been silent for too long.
     ///
-    /// * `patience`: the limit without a living sender, and the limit with a living sender.
+    /// * `patience`: the limit if the sender is not known to be alive, and the limit if it is.
     fn silent_since(&self, began_at: u64, now: u64, patience: [u64; 2]) -> bool {
         let elapsed = |at: u64| now.saturating_sub(at);
         let silence = elapsed(began_at.max(self.received_at.unwrap_or(0)));
@@ -101,8 +102,8 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Works like [`Self::new`], for lossless delivery. An input whose sender is known to be alive may take ten times as long,
-    /// because the sender is still computing.
+    /// Works like [`Self::new`], for lossless delivery. An input whose sender is known to be alive may be silent for ten times as long,
+    /// because the sender may still be computing.
     pub fn lossless(n_inputs: usize, patience_nanos: u64) -> Self {
         Self {
             alive_patience_nanos: patience_nanos.saturating_mul(10),
@@ -117,8 +118,8 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Records that the sender of an input was restarted, and has forgotten its received messages. Frames that have begun wait for the
-    /// input for one more second.
+    /// Records that the sender of an input was restarted and has forgotten the messages that it had received. Frames that have already
+    /// begun wait for the input for one more second.
     pub fn restarted(&mut self, input: usize, now: u64) {
         if let Some(input) = self.inputs.get_mut(input) {
             input.restarted_at = Some(now);
@@ -132,9 +133,9 @@ impl<T> Joiner<T> {
         }
     }
 
-    /// Takes a message.
+    /// Adds a message.
     ///
-    /// * `input`: index below the number of inputs. A message of any other input is [`Push::Late`].
+    /// * `input`: index of the input. If there is no such input, the result is [`Push::Late`].
     /// * `now`: nanoseconds of a clock that never goes back.
     pub fn push(&mut self, input: usize, frame: u64, item: T, now: u64) -> Push {
         let n = self.inputs.len();
@@ -143,7 +144,8 @@ impl<T> Joiner<T> {
         };
         state.received_at = Some(now);
         state.down = false;
-        // The number is not the maximum: after one wrong frame number far ahead, later frames wait for this input again.
+        // The number is set even if it is lower than before: after one wrong frame number far ahead, later frames then wait for this input
+        // again.
         state.last_frame = Some(frame);
         if frame < self.next_frame {
             return Push::Late;
@@ -171,8 +173,8 @@ impl<T> Joiner<T> {
 
     /// Returns the earliest pending frame, if it is complete.
     ///
-    /// Call this until it returns `None`, because several frames may have become complete at once. Frames do not wait for an input
-    /// that is down until it sends again.
+    /// Call this until it returns `None`, because several frames may have become complete at once. While an input is down, frames do not
+    /// wait for it.
     pub fn next(&mut self, now: u64) -> Option<Joined<T>> {
         let (&frame, slot) = self.pending.first_key_value()?;
         let patience = [self.patience_nanos, self.alive_patience_nanos];
@@ -196,9 +198,9 @@ impl<T> Joiner<T> {
         })
     }
 
-    /// Returns the latest complete frame that is wanted, and the number of skipped frames.
+    /// Returns the latest complete frame for which `wants` returns true, and the number of skipped frames.
     ///
-    /// * `wants`: returns true if a frame has to be processed.
+    /// * `wants`: function that returns true if a frame has to be processed.
     pub fn latest(
         &mut self,
         now: u64,
@@ -227,8 +229,8 @@ impl<T> Joiner<T> {
         self.pending.len()
     }
 
-    /// Returns true if no frame will follow. All frames were returned, at least one input has ended, and all other inputs have ended or
-    /// been silent for too long.
+    /// Returns true if no more frames will follow. This is the case if all frames were returned, at least one input has ended, and each
+    /// other input has ended or been silent for too long.
     pub fn is_over(&self, now: u64) -> bool {
         let patience = [self.patience_nanos, self.alive_patience_nanos];
         let is_silent = |input: &Input| {
@@ -349,7 +351,7 @@ mod tests {
         assert_eq!(frames(&mut joiner, 29), []);
         joiner.alive(1, 30);
         assert_eq!(frames(&mut joiner, 30), [(0, vec![true, false])]);
-        // No frame waits for the input until it sends again; a late message is enough.
+        // Frames do not wait for the input until it sends again; a late message is enough.
         joiner.push(0, 1, 'b', 40);
         assert_eq!(frames(&mut joiner, 40), [(1, vec![true, false])]);
         assert_eq!(joiner.push(1, 0, 'c', 45), Push::Late);

@@ -13,7 +13,7 @@ pub(crate) type Copier<T> = Option<fn(&T) -> T>;
 pub(crate) struct Joins<T> {
     pub(crate) joiner: Joiner<Item<T>>,
     pub(crate) last: Last<T>,
-    /// By slot, the function that copies a value into `last`.
+    /// For each slot, the function that copies a value into `last`.
     pub(crate) remember: Vec<Copier<T>>,
     pub(crate) end: Option<Stamp>,
 }
@@ -45,7 +45,7 @@ impl<T> Joins<T> {
         if let Some(Some(copy)) = self.remember.get(slot)
             && status == Status::OK
         {
-            // The message may be too late for its own frame but in time for the next one.
+            // The message may be too late for its own frame, but useful for the next one.
             let value = copy(&item.value);
             self.last.keep(slot, stamp.frame, stamp.captured_at_nanos, value);
         }

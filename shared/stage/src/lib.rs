@@ -8,13 +8,12 @@
 //! |---|---|---|
 //! | one sender for each view | [`Stage::view_input`] | yes |
 //! | one sender for several slots: a worker and its pairs | [`Stage::pair_inputs`] | yes |
-//! | optional: expected errors | [`Stage::optional_input`] | up to a deadline; then the last value is used while it is fresh |
+//! | optional: expected errors | [`Stage::optional_input`] | until a deadline; after that, the last value is used unless it is too old |
 //! | bulk data, read in shared memory | [`Stage::hold_evidence`], [`Stage::hold_frames`] | no |
-//! | a stream of bulk data, one sample a frame | [`Stage::run_stream`] | - |
+//! | a stream of bulk data, with one sample for each frame | [`Stage::run_stream`] | - |
 //!
-//! A service that creates its own frames has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A
-//! service that handles messages as they are received uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as
-//! bytes.
+//! A service that creates its own frames has no input and uses [`Stage::wait_for_receivers`] and [`Stage::end_with`]. A service that
+//! handles each message as soon as it is received uses a [`Port`] for each topic, or an [`any::Receiver`] for messages as bytes.
 #![forbid(unsafe_code)]
 
 pub mod any;

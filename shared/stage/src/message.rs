@@ -7,14 +7,14 @@ use messages::{
 
 /// A message with a stamp, a timing and a status.
 pub trait Stamped: Copy {
-    /// Name of the type in log messages about refused messages.
+    /// Name of the type, as used in log messages about rejected messages.
     const NAME: &'static str;
 
     /// Returns the stamp: session, frame, capture time, view, epoch.
     fn stamp(&self) -> &Stamp;
     /// Returns the times at which the sender received its input and sent the message.
     fn timing(&self) -> &Timing;
-    /// Returns the status. The message carries a result, is the end of the stream, or has the reason why there is no result.
+    /// Returns the status: whether the message carries a result, is the end of the stream, or states why there is no result.
     fn status(&self) -> Status;
     /// Returns the same message with another stamp and timing.
     #[must_use]
@@ -60,9 +60,9 @@ stamped! {
     Skeletons => "skeletons", wire::end_of_results(0);
 }
 
-/// The header of bulk data.
+/// The header of bulk data (a large array).
 pub trait BulkHeader: runtime::Header {
-    /// Name of the type in log messages about refused messages.
+    /// Name of the type, as used in log messages about rejected messages.
     const NAME: &'static str;
 
     /// Returns the stamp: session, frame, capture time, view, epoch.

@@ -77,20 +77,20 @@ impl<'a, M: Message + Stamped> Output<'a, M> {
 /// Stamp at the end of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum EndStamp {
-    /// A stamp with only the session.
+    /// A stamp in which only the session is set.
     Session,
-    /// The stamp of the input's end of stream, which gives the number of frames of the view.
+    /// The stamp of the end of the input's stream, which contains the number of frames of the view.
     Input,
 }
 
-/// Sends the end of a stream, with the stamp of the input's end if there is one, otherwise with the stamp of the session.
+/// Sends the end of a stream. It has the stamp of the end of the input's stream, if there is one; otherwise a stamp with only the session.
 type SendEnd = dyn Fn(Option<Stamp>, u64) -> Result<(), SendError>;
 
 /// An output of any message type.
 pub(crate) struct Outgoing {
     receivers: Rc<dyn Receivers>,
     n_receivers: usize,
-    /// Sends the end of the stream; `None` for arrays.
+    /// Function that sends the end of the stream; `None` for arrays.
     send_end: Option<Box<SendEnd>>,
 }
 
@@ -120,7 +120,7 @@ impl Outgoing {
         }
     }
 
-    /// Creates an output of arrays. It has no end of stream, because arrays belong to messages that have an end of stream.
+    /// Creates an output of arrays. It needs no end of stream, because arrays belong to messages whose stream has an end.
     pub(crate) fn arrays<E: Element, H: Header>(
         publisher: &Rc<SlicePublisher<E, H>>,
         n_receivers: usize,

@@ -30,7 +30,7 @@ impl<M: Message> Receive<M> for Subscriber<M> {
     }
 }
 
-/// The sender of a topic.
+/// The process that sends on a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sender {
     /// A process of one view.
@@ -47,8 +47,8 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// Checks the session, the sender and the times of a message. The end of a worker's stream contains no pair, so the number of the pair
-    /// is not checked.
+    /// Checks the session, the sender and the times of a message. The end of a worker's stream does not belong to a pair, so its pair
+    /// number is not checked.
     pub(crate) fn check<M: Stamped>(
         self,
         message: &M,
@@ -69,7 +69,7 @@ impl Sender {
     }
 }
 
-/// The receiving end of a topic. Returns the messages of this session and sender. Other messages are counted and logged.
+/// The receiving end of a topic. Returns the messages of this session and of the right sender. Other messages are counted and logged.
 #[derive(Debug)]
 pub struct Port<R> {
     receiver: R,
@@ -133,9 +133,9 @@ impl<R> Port<R> {
         Ok(None)
     }
 
-    /// Returns true if the sender, after a restart, has forgotten frames that others have received. This is the case for a sender that
-    /// answers messages of views. By contrast, a process of a view receives the frame again, and a fusion worker holds the messages that
-    /// the others wait for.
+    /// Returns true if the sender, after a restart, no longer has frames that its receivers are waiting for. This is the case for a sender
+    /// that computes from messages of views. By contrast, a process of one view receives the frame again, and a fusion worker still holds
+    /// the messages for which others wait.
     pub(crate) fn forgets(&self) -> bool {
         self.sender == Sender::All
     }
@@ -148,7 +148,7 @@ impl<R> Port<R> {
         self.receiver.senders()
     }
 
-    /// Discards all waiting messages, so that no sender waits for room.
+    /// Discards all waiting messages, so that no sender has to wait for room.
     ///
     /// # Errors
     ///

@@ -1,6 +1,6 @@
 //! Bulk samples that are held until the frame that needs them arrives.
 
-/// Number of frames held at the same time with realtime delivery: three that wait, and one that is being received.
+/// Number of frames that are held at the same time with realtime delivery: three that wait, and one that is being received.
 pub const HELD_REALTIME: usize = 4;
 
 /// Maximum distance of a frame number from the current frame, in used frames. A larger distance is a sender's error.
@@ -17,8 +17,9 @@ pub(crate) struct Shelf<S> {
 impl<S> Shelf<S> {
     /// Creates a shelf.
     ///
-    /// * `capacity`: number of samples that are held. With 1, a sample is received only when the previous one has been released, because
-    ///   its sender waits for that. With more, all samples are received, and those most likely to be needed are kept.
+    /// * `capacity`: number of samples that are held. With a capacity of 1, a sample is received only after the previous one has been
+    ///   released; the sender waits until then. With a larger capacity, all samples are received, and those most likely to be needed are
+    ///   kept.
     /// * `frame_step`: distance between the used frames.
     pub(crate) fn new(capacity: usize, frame_step: u64) -> Self {
         Self {
@@ -79,8 +80,8 @@ impl<S> Shelf<S> {
     }
 }
 
-/// Returns the index of the frame that is released first. A slow stage processes every n-th frame, where n is a power of two. The frame
-/// that is released is therefore the one that is divisible only by the smallest power of two. If there are several such frames, it is the
+/// Returns the index of the frame that is released first. A slow stage processes every n-th frame, where n is a power of two. The released
+/// frame is therefore the one whose number is divisible only by the smallest power of two; if there are several such frames, it is the
 /// oldest.
 fn least_needed(steps: &[u64]) -> usize {
     let keys = steps.iter().enumerate();
@@ -95,7 +96,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns a topic in which these frames wait.
+    /// Returns a topic in which the given frames are waiting.
     fn topic(
         frames: impl IntoIterator<Item = u64>,
     ) -> impl FnMut() -> Result<Option<(u64, char)>, Infallible> {

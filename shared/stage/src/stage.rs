@@ -95,8 +95,8 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(slot)
     }
 
-    /// Adds the topic of a view whose messages are optional. With realtime delivery, no frame waits for them longer
-    /// than `deadline`. After that, the last value is used while it is fresh ([`Frame::latest`]).
+    /// Adds the topic of a view whose messages are optional. With realtime delivery, no frame waits for them longer than `deadline`. After
+    /// that, the last value is used unless it is too old ([`Frame::latest`]).
     ///
     /// * `max_age`: maximum difference of capture times at which a value is used; the same for all optional inputs.
     ///
@@ -120,8 +120,8 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(slot)
     }
 
-    /// Adds the topics of all fusion workers, with one slot for each pair, in the order of pairs. A worker sends messages for its pairs,
-    /// which are assigned in turn. Returns the slot of the first pair.
+    /// Adds the topics of all fusion workers, with one slot for each pair, in the order of the pairs. The pairs are assigned to the workers
+    /// in turn, and each worker sends messages for its own pairs. Returns the slot of the first pair.
     ///
     /// # Errors
     ///
@@ -184,7 +184,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(())
     }
 
-    /// Holds the evidence of a view in shared memory. It holds one frame, which is released when that frame has been processed.
+    /// Holds the evidence of a view in shared memory, for one frame at a time. The evidence is released when its frame has been processed.
     ///
     /// * `frame_step`: distance between the used frames.
     ///
@@ -284,7 +284,7 @@ impl<'a, T: 'a> Stage<'a, T> {
         Ok(publisher)
     }
 
-    /// Waits until the receivers of all outputs are connected, or patience has run out.
+    /// Waits until the receivers of all outputs are connected, or until the time limit has passed.
     pub fn wait_for_receivers(&self) {
         let patience = self.service.patience_at_start(self.patience);
         for output in &self.outgoing {
@@ -389,7 +389,7 @@ impl<'a, T: 'a> Stage<'a, T> {
                 Ok(())
             },
             || {
-                // An input that counts as down may send again, and its sender must not wait for room here.
+                // An input that counts as down may send again, and its sender must not have to wait for room here.
                 let drained = self.held.iter().try_for_each(|held| held.drain());
                 drained.and_then(|()| inbox.drain())
             },

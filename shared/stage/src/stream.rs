@@ -31,8 +31,8 @@ pub struct StreamFrame {
 impl Stage<'_, ()> {
     /// Processes the frames of a view until the footage ends or a stop is requested. Then sends the end of the stream.
     ///
-    /// With realtime delivery, frames for which there is no time are skipped and counted. A restarted process
-    /// counts the frames that were lost since its previous epoch.
+    /// With realtime delivery, frames are skipped and counted if there is no time for them. A restarted process counts the frames that were
+    /// lost since its previous epoch.
     ///
     /// # Errors
     ///

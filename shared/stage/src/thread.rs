@@ -24,7 +24,7 @@ impl WriterThread {
         Ok(Self { handle })
     }
 
-    /// Waits until everything is written, while heartbeats continue. The sending end of the queue must have been dropped.
+    /// Waits until everything has been written, while heartbeats continue. The sending end of the queue must have been dropped before.
     ///
     /// # Errors
     ///

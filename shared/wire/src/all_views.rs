@@ -7,10 +7,10 @@ use pipeline::{AllViewsHypothesis, AllViewsResult, PairResult};
 use crate::error::{equal, index};
 use crate::{WireError, pair_to_message};
 
-/// Writes the result of all views, or the fact that there is no result. The caller fills in stamps and timing.
+/// Writes the result of all views, or that there is no result. The caller fills in stamps and timing.
 ///
-/// Message `v - 1` is about view `v` and the first view of the result. Each message contains the energy of all views.
-/// It has no result if view `v` was not solved, or is the first view itself.
+/// Message `v - 1` is about view `v` and the first view of the result. Each message contains the energy of all views. The message has no
+/// result if view `v` was not solved, or is the first view itself.
 ///
 /// * `n_views`: number of views of the rig.
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
@@ -42,13 +42,13 @@ pub fn all_views_to_messages(
     (1..n_views).map(message).collect()
 }
 
-/// Checks that a message is about view `v + 1` and an earlier view, where `v` is `view` of its stamp.
+/// Checks which views a message is about: they must be view `v + 1` and an earlier view, where `v` is `view` of the message's stamp.
 ///
 /// * `n_views`: number of views of the rig.
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if there is no such view, or the message is about other views.
+/// Returns a [`WireError`] if there is no such view, or if the message is about other views.
 pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireError> {
     let nth = index(
         "answer",
@@ -73,7 +73,7 @@ pub fn check_all_views(message: &PairPose, n_views: usize) -> Result<(), WireErr
     Ok(())
 }
 
-/// Returns the pair of the first view of a result and the view at `place`.
+/// Returns the pair of the first view of a result with the view at `place`.
 fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     let hypothesis = |all_views_hypothesis: &AllViewsHypothesis| PairEstimate {
         start: PairStart {
@@ -92,17 +92,18 @@ fn beside_the_first(answer: &AllViewsResult, place: usize) -> PairResult {
     }
 }
 
-/// Combines the messages to the result of all views; `None` if there is none.
+/// Combines the messages into the result of all views; `None` if there is no result.
 ///
-/// The messages do not contain the iterations. In the result, they are empty, and the share of active terms is 0.
+/// The messages contain neither the iterations nor the fraction of active terms, so the list of iterations in the result is empty, and the
+/// fraction is 0.
 ///
 /// * `pairs`: pairs of one frame, as [`pair_from_message`](crate::pair_from_message) reads them, in ascending order of
 ///   their second view.
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if the pairs are not of one result: they differ in the first view, the energy or the number of
-/// hypotheses, or are out of order.
+/// Returns a [`WireError`] if the pairs do not belong to one result: they differ in the first view, the energy or the number of hypotheses,
+/// or are out of order.
 pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResult>, WireError> {
     let Some(first) = pairs.first() else {
         return Ok(None);
@@ -138,7 +139,7 @@ pub fn all_views_from_pairs(pairs: &[PairResult]) -> Result<Option<AllViewsResul
     Ok(Some(answer))
 }
 
-/// Returns a hypothesis with the first view only.
+/// Returns a hypothesis that contains only the first view.
 fn alone(it: &PairEstimate) -> AllViewsHypothesis {
     AllViewsHypothesis {
         exchanged: vec![false],

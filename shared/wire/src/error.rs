@@ -15,7 +15,7 @@ pub enum WireError {
         /// Maximum value allowed.
         limit: usize,
     },
-    /// Sender and receiver have different models, rigs or layouts.
+    /// The sender and the receiver use different models, rigs or layouts.
     #[error("{field} is {got}, expected {expected}")]
     Mismatch {
         /// Name of the number.
@@ -34,7 +34,7 @@ pub enum WireError {
         entry: usize,
         /// Value of the index.
         got: usize,
-        /// Smallest value that is not allowed.
+        /// Smallest value that is too large.
         limit: usize,
     },
     /// A number is not finite, or is negative where it must not be.
@@ -57,7 +57,7 @@ pub enum WireError {
         /// Session of the receiver.
         expected: u64,
     },
-    /// The message does not come from the sender of the topic.
+    /// The message does not come from the process that is the sender of this topic.
     #[error("{field} is {got}, but the sender of this topic must be {expected}")]
     Sender {
         /// Name of the field.
@@ -88,7 +88,7 @@ pub enum WireError {
 }
 
 impl WireError {
-    /// Returns the cause under which the receiver counts the message.
+    /// Returns the cause under which the receiver counts the rejected message.
     pub fn refusal(&self) -> Refusal {
         match self {
             Self::TooMany { .. } | Self::Mismatch { .. } => Refusal::Size,
@@ -101,7 +101,7 @@ impl WireError {
     }
 }
 
-/// Refuses a count above `limit`.
+/// Returns an error for a count above `limit`.
 pub(crate) fn count(field: &'static str, got: usize, limit: usize) -> Result<usize, WireError> {
     if got > limit {
         return Err(WireError::TooMany { field, got, limit });
@@ -109,7 +109,7 @@ pub(crate) fn count(field: &'static str, got: usize, limit: usize) -> Result<usi
     Ok(got)
 }
 
-/// Refuses a number that differs from the receiver's.
+/// Returns an error for a number that differs from the receiver's number.
 pub(crate) fn equal(field: &'static str, got: usize, expected: usize) -> Result<(), WireError> {
     if got != expected {
         return Err(WireError::Mismatch {
@@ -121,7 +121,7 @@ pub(crate) fn equal(field: &'static str, got: usize, expected: usize) -> Result<
     Ok(())
 }
 
-/// Refuses an index that is not below `limit`.
+/// Returns an error for an index that is not below `limit`.
 pub(crate) fn index(
     field: &'static str,
     entry: usize,
@@ -139,7 +139,7 @@ pub(crate) fn index(
     Ok(got)
 }
 
-/// Refuses a number that is not finite.
+/// Returns an error for a number that is not finite.
 pub(crate) fn finite(field: &'static str, entry: usize, got: f64) -> Result<f64, WireError> {
     if !got.is_finite() {
         return Err(WireError::Value {

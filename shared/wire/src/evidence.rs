@@ -1,4 +1,4 @@
-//! Response maps: the header of an array that is sent without copying.
+//! Response maps: the header that describes an array sent without copying.
 
 use fmp::{Bound, Bounds, Layout, Region, Responses, Scope, ScopeError};
 use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
@@ -6,7 +6,7 @@ use messages::{EvidenceHeader, MAX_LEVELS, Stamp, Status, Timing};
 use crate::WireError;
 use crate::error::{count, equal, index};
 
-/// Received evidence: the responses, which stay in place, and the bounds of their levels.
+/// Received evidence: the responses, which remain in shared memory, and the bounds of their levels.
 #[derive(Debug, Clone)]
 pub struct EvidenceView<'a> {
     responses: Responses<'a>,
@@ -177,7 +177,7 @@ mod tests {
         Bounds::new(vec![Bound::UNKNOWN; layout().levels.len()])
     }
 
-    /// Returns any scope of the layout, as shares of its levels, columns and rows.
+    /// Returns any scope of the layout, given as fractions of its levels, columns and rows.
     fn scope() -> impl Strategy<Value = Scope> {
         let layout = layout();
         let range = |n: usize| {

@@ -8,9 +8,9 @@ use pipeline::PairResult;
 use crate::error::{count, equal, finite, index};
 use crate::{WireError, pose_from_message, pose_to_message};
 
-/// Writes the result of a pair, or the fact that there is no result. The caller fills in stamp and timing.
+/// Writes the result of a pair, or that there is no result. The caller fills in stamp and timing.
 ///
-/// The message contains only the length of [`PairEstimate::iterations`].
+/// Of [`PairEstimate::iterations`], the message contains only the length.
 ///
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
 ///
@@ -67,7 +67,7 @@ fn hypothesis(estimate: &PairEstimate) -> Result<PairHypothesis, WireError> {
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if the pair is not two ascending views of the rig, or if a pose is malformed.
+/// Returns a [`WireError`] if the views are not two views of the rig in ascending order, or if a pose is malformed.
 pub fn pair_from_message(
     message: &PairPose,
     plans: &[impl AsRef<ViewPlan>],

@@ -55,8 +55,8 @@ fn person_to_message(person: &KnownPerson) -> Result<PersonMessage, WireError> {
 ///
 /// Returns a [`WireError`] in these cases:
 ///
-/// * There are too many people, a person has no identity, or two people share an identity or a candidate.
-/// * A candidate is one that no view can have, or belongs to a view that is not in the rig.
+/// * There are too many people, a person has no id, or two people have the same id or the same candidate.
+/// * The index of a candidate is too large, or the candidate belongs to a view that is not in the rig.
 pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeople, WireError> {
     let n = count("n_people", message.n_people as usize, MAX_PEOPLE)?;
     let mut people: Vec<KnownPerson> = Vec::with_capacity(n);

@@ -12,7 +12,7 @@ use crate::WireError;
 use crate::error::{count, equal, finite, index};
 use crate::stamp::at_most;
 
-/// Maximum time from the instant of a frame to its picture: more than half a frame period at one frame in ten seconds.
+/// Maximum time from the instant of a frame to its picture. At one frame in ten seconds, this is more than half a frame period.
 const MOST_SKEW_NANOS: u64 = 10_000_000_000;
 
 /// Writes a pose.
@@ -40,8 +40,8 @@ pub fn pose_to_message(pose: &Pose) -> Result<PoseMessage, WireError> {
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if the number of parts, the level, a cell or a type is not one of the model's, or if
-/// the score is not finite.
+/// Returns a [`WireError`] if the number of parts, the level, a cell or a type does not exist in the model or the layout, or if the score
+/// is not finite.
 pub fn pose_from_message(
     message: &PoseMessage,
     model: &Model,
@@ -139,7 +139,7 @@ pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
     Ok(message.skew_nanos as f64 * 1e-9)
 }
 
-/// Adds the evidence of the picture for the direction in which the person of every candidate faces.
+/// Adds, for every candidate, the evidence of the picture about the direction in which the person faces.
 ///
 /// # Errors
 ///
@@ -152,7 +152,7 @@ pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Resu
     Ok(())
 }
 
-/// Reads the evidence of the picture for the direction in which the person of every candidate faces.
+/// Reads, for every candidate, the evidence of the picture about the direction in which the person faces.
 ///
 /// * `n_candidates`: number of candidates of the message.
 ///
@@ -175,7 +175,7 @@ fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvide
     Ok(evidence)
 }
 
-/// Adds the extra keypoints of as many whole candidates as fit.
+/// Adds the extra keypoints of the first candidates: of as many as fit completely into the message.
 ///
 /// * `n`: number of extra keypoints of a candidate.
 ///
@@ -198,12 +198,12 @@ pub fn extras_to_message(
     Ok(())
 }
 
-/// Returns the number of entries that whole candidates of `n` extra keypoints fill.
+/// Returns the number of entries that are used if only candidates with all `n` extra keypoints are stored.
 fn room_of(n: usize) -> usize {
     MAX_VIEW_KEYPOINTS - MAX_VIEW_KEYPOINTS % n.max(1)
 }
 
-/// Reads the extra keypoints of the candidates, one candidate after the other. Those of the last candidates may be missing.
+/// Reads the extra keypoints of the candidates, one candidate after the other. The keypoints of the last candidates may be missing.
 ///
 /// * `n`: number of extra keypoints of a candidate in the deployment.
 /// * `n_candidates`: number of candidates of the message.

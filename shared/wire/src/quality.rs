@@ -5,7 +5,7 @@ use messages::{MAX_PARTS, PairPose, Status, ViewQuality};
 use crate::WireError;
 use crate::error::{count, equal, finite};
 
-/// Writes predicted errors, or the fact that there are none. The caller fills in stamp and timing.
+/// Writes predicted errors, or that there are none. The caller fills in stamp and timing.
 ///
 /// * `sigma_px`: expected error of every part, in pixels of the frame.
 ///
@@ -84,7 +84,7 @@ pub fn tau_from_message(
     tau.map(|(part, &tau)| checked(part, tau)).collect::<Result<_, _>>().map(Some)
 }
 
-/// Adds the prediction for one of the two views of a pair.
+/// Adds the predicted errors of one of the two views of a pair.
 ///
 /// * `side`: 0 for the first view, 1 for the second.
 /// * `age`: age of the prediction, in frames.
@@ -107,7 +107,7 @@ pub fn sigma_to_pair(
     Ok(())
 }
 
-/// Reads the prediction for one of the two views of a pair and its age in frames; `None` if there is none.
+/// Reads the predicted errors of one of the two views of a pair, and the age of the prediction in frames; `None` if there is no prediction.
 ///
 /// * `side`: 0 for the first view, 1 for the second.
 ///

@@ -59,7 +59,8 @@ pub fn sightings_to_message(
 
 /// Reads the people that a view sees; `None` unless the status is [`Status::OK`] and there is a person.
 ///
-/// * `n_extras`: number of extra keypoints of a person. The last people may lack extra keypoints, because the room in a message is limited.
+/// * `n_extras`: number of extra keypoints of a person. The last people in the list may have no extra keypoints, because the room in a
+///   message is limited.
 ///
 /// # Errors
 ///
@@ -118,8 +119,8 @@ fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]
     }
 }
 
-/// Writes the grids of the maps of the people of a view. The caller fills in stamp and timing, and sends the values of one person
-/// after the other.
+/// Writes the grids of the maps of the people in a view. The caller fills in stamp and timing, and sends the map values one person after
+/// the other.
 ///
 /// # Errors
 ///
@@ -150,8 +151,8 @@ pub fn maps_to_message(
 ///
 /// # Errors
 ///
-/// Returns a [`WireError`] if there are more people than fit, or if a grid is not valid. It also returns one if the number of
-/// values is not that of the cells, or if a value is not finite.
+/// Returns a [`WireError`] if there are more people than fit, or if a grid is not valid. It also returns an error if the number of values
+/// differs from the number of cells, or if a value is not finite.
 pub fn maps_from_message<'a>(
     message: &EvidenceHeader,
     values: &'a [f32],
@@ -204,9 +205,9 @@ pub fn n_values(grids: &[MapGrid]) -> usize {
     each.fold(0, usize::saturating_add)
 }
 
-/// Checks that received values are finite. A single value that is not finite could end up in any sum over the maps.
+/// Checks that received values are finite, because a single value that is not finite could affect every sum over the maps.
 fn check_maps(values: &[f32]) -> Result<(), WireError> {
-    // Avoids a branch for each value, because a frame has up to a million values.
+    // This avoids a branch for each value, because a frame has up to a million values.
     if values.iter().fold(0.0_f32, |sum, value| sum + value * 0.0) == 0.0 {
         return Ok(());
     }

@@ -13,7 +13,7 @@ use crate::error::{count, equal, finite};
 /// A person with a skeleton and extra keypoints.
 #[derive(Debug, Clone, Copy)]
 pub struct SolvedPerson<'a> {
-    /// Person's identity within the run, counted from 1.
+    /// The person's id within the run, counted from 1.
     pub id: u64,
     /// Skeleton of the person, which may have no joints.
     pub skeleton: &'a Skeleton,
@@ -110,14 +110,13 @@ pub fn end_of_results(session: u64) -> Skeletons {
     }
 }
 
-/// Checks the counts of a result against the receiver's rig and joint set. Also checks that identities are unique and coordinates
-/// are finite.
+/// Checks the counts of a result against the receiver's rig and joint set. Also checks that ids are unique and coordinates are finite.
 ///
 /// # Errors
 ///
 /// Returns a [`WireError`] in these cases:
 ///
-/// * There are too many people, a person has no identity, or two people share one.
+/// * There are too many people, a person has no id, or two people have the same id.
 /// * The result is for other views or joints, or a count is larger than its array.
 /// * A joint, an extra keypoint or a part that was found has a coordinate that is not finite.
 pub fn check_skeletons(
@@ -399,7 +398,7 @@ mod tests {
         assert!(refused(
             |person| person.views[0].centres_px[1][0] = f64::INFINITY
         ));
-        // Entries that were not found are not checked.
+        // Joints that were not found are not checked.
         assert!(!refused(|person| person.joints[1].in_world[0] = f64::NAN));
         assert!(!refused(
             |person| person.views[1].centres_px[0][0] = f64::NAN

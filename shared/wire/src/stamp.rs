@@ -5,9 +5,9 @@ use messages::{FrameHeader, Stamp, Status, Timing};
 use crate::WireError;
 use crate::error::equal;
 
-/// Maximum time by which a time stamp may be ahead of the clock. All processes of a machine share the clock, so this is generous.
+/// Maximum time by which a time stamp may be ahead of the clock. This is generous, because all processes of a machine use the same clock.
 const SLACK_NANOS: u64 = 1_000_000_000;
-/// Limit of the frame number: more frames than any camera captures.
+/// Limit of the frame number; no camera ever captures so many frames.
 const MOST_FRAMES: u64 = 1 << 40;
 
 /// The stamp that the receiver of a topic expects.
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Returns the error for a changed frame of 36 bytes.
+    /// Returns the error for a frame of 36 bytes whose header was changed.
     fn refused(change: impl Fn(&mut FrameHeader)) -> (Refusal, String) {
         let mut header = header();
         check_frame(&header, 36, &EXPECTED).unwrap();

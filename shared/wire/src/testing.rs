@@ -11,7 +11,7 @@ use multiview::ViewPlan;
 use nalgebra::Isometry3;
 use proptest::prelude::*;
 
-/// Three parts in a chain with one, two and three types.
+/// Returns a model of three parts in a chain, with one, two and three types.
 pub(crate) fn model() -> Model {
     let filter = Filter {
         rows: 3,
@@ -44,7 +44,7 @@ pub(crate) fn model() -> Model {
     .unwrap()
 }
 
-/// The layout of an image of 80x60 pixels.
+/// Returns the layout for an image of 80x60 pixels.
 pub(crate) fn layout() -> Layout {
     Layout::new(&model(), 80, 60).unwrap()
 }
@@ -90,12 +90,12 @@ pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
     )
 }
 
-/// Two views of [`layout`]'s size.
+/// Returns the plans of two views with the size of [`layout`].
 pub(crate) fn plans() -> Vec<Arc<ViewPlan>> {
     plans_of(2)
 }
 
-/// `n_views` views of [`layout`]'s size, side by side.
+/// Returns the plans of `n_views` views with the size of [`layout`], side by side.
 pub(crate) fn plans_of(n_views: usize) -> Vec<Arc<ViewPlan>> {
     let camera = |x: f64| Camera {
         name: format!("at {x}"),

@@ -90,7 +90,7 @@ fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
     let refused = port.receive().map(drop);
     assert!(matches!(refused, Err(ReceiveError::TooManyHeld { .. })));
     drop(held);
-    // The queue kept the first messages, for which there was room.
+    // The queue has kept the first messages, for which there was room.
     let n_loops = || port.receive().unwrap().map(|receive| receive.payload()[0].n_loops);
     assert_eq!([n_loops(), n_loops(), n_loops()], [Some(1), Some(2), None]);
     assert!(!guest.is_over());

@@ -181,7 +181,7 @@ fn number_of(view: Option<usize>) -> u32 {
     view.and_then(|view| u32::try_from(view).ok()).unwrap_or(NO_VIEW)
 }
 
-/// Truncates a name between characters.
+/// Truncates a name to the available length, without splitting a character.
 fn cut(name: &str) -> [u8; MAX_NAME] {
     let mut bytes = [0; MAX_NAME];
     let len = name.floor_char_boundary(MAX_NAME);

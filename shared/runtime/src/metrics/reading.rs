@@ -19,7 +19,7 @@ pub enum ReadingError {
     UnknownSpan {
         /// Index of the row.
         row: usize,
-        /// Number of the stage.
+        /// Number of the unknown stage.
         span: u32,
     },
     /// The index of a view is too large.
@@ -90,7 +90,7 @@ pub struct Reading {
     pub peak_memory_bytes: u64,
     /// Current and maximum length of the queue of frames or results, if there is a queue.
     pub queue: Option<[u32; 2]>,
-    /// Number of people in the last result, if the process counts them.
+    /// Number of people in the last result, if the process counts people.
     pub n_people: Option<u32>,
     /// View that the process works for, if there is one.
     pub view: Option<ViewName>,
@@ -120,7 +120,7 @@ pub struct Timed {
     pub view: Option<usize>,
     /// Number of measured durations.
     pub count: u64,
-    /// Recent number of durations per second, in thousandths.
+    /// Recent rate of measurements, in thousandths of a hertz.
     pub millihertz: u64,
     /// Median duration.
     pub p50_nanos: u64,
@@ -370,7 +370,7 @@ mod tests {
             prop_assert_eq!(Reading::from_message(&it.to_message()), Ok(it));
         }
 
-        /// Any message is either read or refused; a message that is read can be written again.
+        /// Any message is either read or rejected; a message that was read can be written again.
         #[test]
         fn any_message_is_refused_or_survives_a_round_trip(
             it in any_reading(), n_rows in any::<u32>(), name in any::<[u8; MAX_NAME]>(),

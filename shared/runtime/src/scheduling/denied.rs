@@ -4,7 +4,7 @@ use std::io;
 
 use super::{Policy, RealTime, text};
 
-/// A request that the system denies. The process can continue without it.
+/// A request that the system has denied. The process can continue without it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
     /// The process may not use all requested cores.
@@ -29,7 +29,7 @@ pub enum Denied {
         #[source]
         source: Refusal,
     },
-    /// The process may not lock memory, or only a part of it.
+    /// The process may not lock memory, or not enough of it.
     #[error("cannot lock memory{}", limit(.limit_bytes.as_ref()))]
     Memory {
         /// Maximum amount of memory, in bytes; `None` if the limit is not the reason.
@@ -64,7 +64,7 @@ impl From<io::ErrorKind> for Refusal {
 }
 
 impl Denied {
-    /// Returns a remedy to try.
+    /// Returns a remedy that the user can try.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Cores { .. } => {

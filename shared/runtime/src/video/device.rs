@@ -21,7 +21,7 @@ pub struct VideoAbout {
     pub bus: String,
 }
 
-/// Settings requested from a device. A setting that is not given stays unchanged.
+/// Settings requested from a device. A setting that is `None` or empty stays unchanged.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VideoWish {
     /// Pixel formats, best first. The first one that the device offers is used.
@@ -45,7 +45,7 @@ pub struct VideoMode {
     pub rate_hz: Option<f64>,
 }
 
-/// Refuses a path that is not a video device, by its kind and number, before it is opened. Opening some devices has an effect.
+/// Checks, before a path is opened, that it is a video device, by its kind and number. Opening some other devices would have side effects.
 fn check_kind(path: &Path) -> Result<(), VideoError> {
     const VIDEO: u32 = 81;
     let status = stat(path).map_err(|error| VideoError::Open {
@@ -158,7 +158,7 @@ impl VideoDevice {
         })
     }
 
-    /// Returns the mode in which the device delivers pictures now.
+    /// Returns the mode in which the device currently delivers pictures.
     ///
     /// # Errors
     ///

@@ -21,7 +21,7 @@ pub enum VideoError {
     NoCamera {
         /// Path of the device.
         path: PathBuf,
-        /// Condition that is not met.
+        /// Description of what is wrong.
         why: String,
     },
     /// A request failed.
@@ -34,7 +34,7 @@ pub enum VideoError {
         /// Cause of the error.
         source: io::Error,
     },
-    /// The device does not have the requested format, size or rate.
+    /// The device does not offer the requested format, size or rate.
     #[error("the camera {} has no {what} {wanted}; it offers {offered}", path.display())]
     NotOffered {
         /// Path of the device.
@@ -43,7 +43,7 @@ pub enum VideoError {
         what: &'static str,
         /// Requested value.
         wanted: String,
-        /// Choices that the device has.
+        /// What the device offers instead.
         offered: String,
     },
     /// The device does not have the requested control.

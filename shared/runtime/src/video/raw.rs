@@ -310,7 +310,7 @@ fn code<T>(request: Request) -> libc::Ioctl {
 mod tests {
     use super::*;
 
-    /// The numbers that `linux/videodev2.h` gives on 64-bit machines.
+    /// These numbers are those of `linux/videodev2.h` on 64-bit machines.
     #[test]
     fn requests_have_the_numbers_of_the_kernel() {
         assert_eq!(code::<Capability>(QUERYCAP), 0x8068_5600);

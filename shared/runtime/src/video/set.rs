@@ -58,7 +58,7 @@ impl VideoDevice {
         Ok(())
     }
 
-    /// Sets the nearest rate, which may differ by 2 in 100: for example 29.97 instead of 30.
+    /// Sets the nearest rate, which may differ by up to 2 %: for example, 29.97 instead of 30.
     fn set_rate(
         &self,
         rate: f64,

@@ -16,18 +16,18 @@ use super::{VideoDevice, VideoError, VideoMode};
 /// Number of buffers, which is enough for a reader that is delayed by a tenth of a second at 60 Hz.
 const N_BUFFERS: u32 = 6;
 
-/// A picture as the device made it.
+/// A picture as delivered by the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VideoPicture<'a> {
     /// Bytes of the picture, in the format of the stream.
     pub bytes: &'a [u8],
     /// Time at which the kernel received the picture, `CLOCK_MONOTONIC`, in nanoseconds; `None` if the driver uses another clock.
     pub at_nanos: Option<u64>,
-    /// Number of the picture from the driver, which also counts lost pictures.
+    /// Number that the driver has given to the picture; lost pictures are numbered, too.
     pub sequence: u32,
     /// True if the driver marked the picture as damaged.
     pub is_damaged: bool,
-    /// True if all buffers were full before this picture was read. The next picture may then be lost for lack of a buffer.
+    /// True if all buffers were full before this picture was read. The next picture may then be lost because there was no buffer for it.
     pub was_full: bool,
 }
 
@@ -38,7 +38,7 @@ pub struct VideoStream {
     buffers: Vec<Mapping>,
     device: VideoDevice,
     mode: VideoMode,
-    /// Index of the buffer that was handed out last and goes back to the driver.
+    /// Index of the buffer that was handed out last, and that must be returned to the driver.
     lent: Option<u32>,
 }
 

@@ -30,7 +30,7 @@ pub struct Bone {
     pub name: &'static str,
     /// Kind of the bone.
     pub kind: Kind,
-    /// Start of the bone: the midpoint of these two joints; both are the same joint except for the trunk.
+    /// Start of the bone: the midpoint of these two joints. Except for the trunk, both are the same joint.
     pub from: [usize; 2],
     /// The joint at the end of the bone.
     pub to: usize,
@@ -105,14 +105,14 @@ pub(crate) fn lengths(joints: &Joints) -> [Option<f64>; N_BONES] {
     core::array::from_fn(|i| BONES[i].length(joints))
 }
 
-/// Marks unusable joints as missing.
+/// Replaces unusable joints with `None`.
 pub(crate) fn clean(joints: &Joints) -> Joints {
     const FARTHEST: f64 = 1e6;
     let is_near = |point: &Point3<f64>| point.iter().all(|x| x.abs() < FARTHEST);
     joints.map(|joint| joint.filter(is_near))
 }
 
-/// Returns the joints of a mask, in ascending order.
+/// Returns the joints in a bit mask, in ascending order.
 pub(crate) fn joints_of(mut mask: u32) -> impl Iterator<Item = usize> {
     core::iter::from_fn(move || {
         let joint = mask.trailing_zeros();

@@ -8,17 +8,18 @@ use crate::body::stature::{MIN_BONES, STATURES, Stature, of_lengths};
 use crate::body::verdict::{Reason, Verdict};
 use crate::body::{Covariances, Joints, N_BONES, N_JOINTS};
 
-/// A bone is impossible if its length differs from the expected length by more than this many standard deviations.
+/// Number of standard deviations by which the length of a bone may differ from the expected length; beyond this, the bone is impossible.
 ///
-/// Our own choice. The standard deviation is at least [`MEASUREMENT_SD`], so 17.5 cm are always allowed. For a man of
-/// 1.75 m, a lower arm may measure 7 to 44 cm, and an upper leg 23 to 63 cm.
+/// The value is our own choice. The standard deviation is at least [`MEASUREMENT_SD`], so a difference of 17.5 cm is always allowed. For a
+/// man of 1.75 m, a lower arm may be 7 to 44 cm long, and an upper leg 23 to 63 cm.
 pub const LIMIT: f64 = 3.5;
 
-/// Standard deviation of the difference between the two sides, as a share of the length; our own choice.
+/// Standard deviation of the difference between left and right, as a fraction of the length; our own choice.
 const SIDES_DIFFER: f64 = 0.02;
 
-/// Standard deviation of a person's estimated stature between frames, as a share; our own choice. The uncertainty
-/// computed from a single frame is not used: the bones of a wrong skeleton disagree, which would make it acceptable.
+/// Standard deviation of a person's estimated stature from frame to frame, as a fraction of the stature; our own choice. The uncertainty
+/// computed from a single frame is not used instead: it is large for a wrong skeleton, whose bones disagree, so that a wrong skeleton would
+/// be accepted.
 const STATURE_SPREAD: f64 = 0.08;
 
 /// Standard deviation of a reach, as a share of the reach, due to differences between people and between joint placements; our own choice.
@@ -29,20 +30,21 @@ const MOST: f64 = 10.0;
 
 /// Judges a skeleton.
 ///
-/// A skeleton is not a person's if
+/// A skeleton cannot be a person's if
 ///
 /// * it has fewer than [`MIN_BONES`] bones,
 /// * its stature is outside [`STATURES`], or differs by more than 28 % from the stature that follows from the learned lengths, or
 /// * more than half of its bones are impossible.
 ///
-/// Otherwise, every impossible bone loses its worst joint, until the rest is possible. The worst joint is the one that also makes other
-/// bones impossible. In a tie, it is the one farther from the trunk, and then the one with the larger covariance.
+/// Otherwise, the worst joint of an impossible bone is dropped, until all remaining bones are possible. The worst joint is the one that
+/// also makes other bones impossible. In a tie, it is the joint farther from the trunk, and after that, the joint with the larger
+/// covariance.
 ///
 /// These are impossible:
 ///
 /// * a bone whose length is more than [`LIMIT`] standard deviations from the length expected for the stature, or from the
 ///   learned length;
-/// * the bones of the two sides, if one is more than [`LIMIT`] standard deviations longer than the other;
+/// * the left and right bones of a kind, if one is more than [`LIMIT`] standard deviations longer than the other;
 /// * two joints connected only through missing joints, if they are farther apart than the bones between them reach.
 ///
 /// * `lengths`: the person's own bone lengths, if known.
@@ -103,7 +105,7 @@ pub(crate) fn expected(kind: Kind, stature: f64, lengths: Option<&Lengths>) -> E
     }
 }
 
-/// The bones of a skeleton compared with their expected lengths.
+/// The bones of a skeleton, compared with their expected lengths.
 struct Judgement<'a> {
     stature: Option<Stature>,
     lengths: [Option<f64>; N_BONES],
@@ -144,7 +146,7 @@ impl<'a> Judgement<'a> {
         (self.z.iter().flatten().map(capped).sum::<f64>() / n as f64).sqrt()
     }
 
-    /// Reason why the skeleton is not a person's, regardless of its proportions.
+    /// Returns the reason why the skeleton cannot be a person's, regardless of its proportions.
     fn reason(&self) -> Option<Reason> {
         let Some(stature) = self.stature else {
             return Some(Reason::TooFewBones {
@@ -160,8 +162,8 @@ impl<'a> Judgement<'a> {
         })
     }
 
-    /// Returns the possible statures, in metres: the statures of people, limited to those near the stature that follows from the learned
-    /// lengths of the present bones.
+    /// Returns the minimum and maximum possible stature, in metres. These are the limits for all people, narrowed to values near the
+    /// stature that follows from the learned lengths of the present bones.
     fn statures(&self) -> [f64; 2] {
         let learned = |bone: usize| self.learned.and_then(|learned| learned.bone(bone));
         let lengths =
@@ -198,7 +200,7 @@ impl<'a> Judgement<'a> {
         joints_of(worst?.joints).max_by(order)
     }
 
-    /// Returns the sum of the deviations of a joint's bones.
+    /// Returns the sum of the deviations of the bones that end at a joint.
     fn strain(&self, joint: usize) -> f64 {
         let of_joint = BONES.iter().zip(&self.z).filter(|bone| bone.0.mask() >> joint & 1 == 1);
         of_joint.filter_map(|bone| *bone.1).map(f64::abs).sum()
@@ -233,7 +235,7 @@ impl<'a> Judgement<'a> {
         self.reaches(joints, found);
     }
 
-    /// Calls `found` for every two joints that are too far apart for the missing bones between them.
+    /// Calls `found` for each pair of joints that are too far apart for the bones between them, whose other joints are missing.
     fn reaches(&self, joints: &Joints, mut found: impl FnMut(Conflict)) {
         let pieces = reach::pieces(joints);
         let length = |kind| expected(kind, self.expected_of, self.learned).metres;

@@ -11,8 +11,8 @@ pub const MAX_FRAMES: usize = 240;
 /// Number of frames after which a length counts as learned.
 pub const MIN_FRAMES: usize = 30;
 
-/// Number of successive frames whose errors are correlated, so that they count as one frame: half a second at 30 frames per second; our own
-/// choice.
+/// Number of successive frames whose errors are so correlated that they count as one frame: half a second at 30 frames per second. The
+/// number is our own choice.
 const ALIKE: f64 = 15.0;
 
 /// A learned length.
@@ -27,8 +27,8 @@ pub struct Learned {
 
 /// Bone lengths of one person, learned over a run; the left and right bones of a kind share one length.
 ///
-/// Stores the lengths from the last [`MAX_FRAMES`] good frames for every kind of bone. The same frames in the same
-/// order give the same lengths.
+/// For every kind of bone, the lengths from the last [`MAX_FRAMES`] good frames are stored. The same frames in the same order give the same
+/// lengths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lengths {
     frames: Vec<Vec<f64>>,
@@ -56,9 +56,9 @@ impl Lengths {
         self.learned = [None; Kind::ALL.len()];
     }
 
-    /// Adds a frame: the bones whose joints the verdict keeps. A skeleton that is not a person's adds nothing.
+    /// Adds a frame: the bones whose joints the verdict keeps. A skeleton that cannot be a person's adds nothing.
     ///
-    /// * `joints`: the joints as triangulated, not as refined; otherwise the lengths would confirm themselves.
+    /// * `joints`: the triangulated joints, before refinement; refined joints already have the learned lengths.
     /// * `verdict`: result of [`check`](crate::body::check) for these joints.
     pub fn add(&mut self, joints: &Joints, verdict: &Verdict) {
         if verdict.nobody.is_some() {

@@ -2,14 +2,15 @@
 
 /// Standard deviation of the measured length of a bone from its true length, in metres.
 ///
-/// Our own choice: the pipeline's joints are off by 5 to 15 cm, mostly together with their neighbours and across the bone.
+/// The value is our own choice. The pipeline's joints have errors of 5 to 15 cm, but these are mostly common to neighbouring joints, and
+/// mostly perpendicular to the bone.
 pub const MEASUREMENT_SD: f64 = 0.05;
 
-/// The statures to which [`Proportion::child`] and [`Proportion::adult`] apply, in metres. Between them, the shares
-/// change linearly with the stature; outside them, they are constant.
+/// The statures to which [`Proportion::child`] and [`Proportion::adult`] apply, in metres. Between the two, the fractions change linearly
+/// with the stature; outside, they are constant.
 ///
-/// 0.95 m is about the median at three years (WHO Child Growth Standards 2006: girls 95.1 cm, boys 96.1 cm). 1.65 m is
-/// between the mean women (1.629 m) and men (1.756 m) of ANSUR II; it is our choice for the end of growth.
+/// 0.95 m is about the median at three years (WHO Child Growth Standards 2006: girls 95.1 cm, boys 96.1 cm). 1.65 m is between the mean
+/// statures of women (1.629 m) and men (1.756 m) in ANSUR II; it is our choice for the end of growth.
 pub const CHILD_AND_ADULT: [f64; 2] = [0.95, 1.65];
 
 /// Kind of a bone; left and right bones have the same kind.
@@ -38,21 +39,21 @@ pub enum Kind {
 /// The length of a kind of bone, as a share of the stature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proportion {
-    /// Mean share of adults.
+    /// Mean fraction in adults.
     pub adult: f64,
-    /// Mean share of a three-year-old child.
+    /// Mean fraction in a three-year-old child.
     pub child: f64,
     /// Standard deviation among people, as a share of the length.
     pub people: f64,
-    /// Differences between detectors and data sets in placing the joints, as a share of the length.
+    /// Standard deviation due to differences between detectors and data sets in the positions of joints, as a fraction of the length.
     pub place: f64,
-    /// Variation of the distance with the posture, as a share of the length.
+    /// Standard deviation due to the posture, as a fraction of the length.
     pub posture: f64,
 }
 
 impl Proportion {
-    /// Returns the standard deviation of the length from that expected for the stature, as a share of the length; combines people,
-    /// places and postures.
+    /// Returns the standard deviation of the length from the length expected for the stature, as a fraction of the length. It combines the
+    /// effects of differences between people, joint positions and postures.
     pub fn spread(&self) -> f64 {
         self.variance().sqrt()
     }
@@ -123,31 +124,32 @@ impl Kind {
 
     /// Returns the length of this kind of bone as a share of the stature.
     ///
-    /// Sources, by their short names:
+    /// The sources have these short names:
     ///
     /// * *D&C*: Drillis & Contini (1966), Body segment parameters, as in figure 4.1 of Winter, *Biomechanics and Motor Control of Human
     ///   Movement*: lengths between joints.
     /// * *ANSUR II*: Gordon et al. (2014), 2012 Anthropometric Survey of U.S. Army Personnel, Natick/TR-15/007: lengths between landmarks
-    ///   on the skin, of 4082 men and 1986 women. `people` is the standard deviation of the share divided by its mean, over the shares of
-    ///   the individuals in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh 0.2476 ± 0.0113, shank 0.2267 ±
-    ///   0.0088, trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth 0.2036 ± 0.0167. There is no value for the head; it
-    ///   uses the spread of the trunk.
+    ///   on the skin, of 4082 men and 1986 women. `people` is the standard deviation of the fraction divided by its mean, over the
+    ///   individuals in its public data: upper arm 0.1909 ± 0.0062, forearm 0.1511 ± 0.0067, thigh 0.2476 ± 0.0113, shank 0.2267 ± 0.0088,
+    ///   trunk 0.3052 ± 0.0154, biacromial breadth 0.2328 ± 0.0114, hip breadth 0.2036 ± 0.0167. There is no value for the head; the spread
+    ///   of the trunk is used.
     ///
     /// | kind | adult |
     /// |---|---|
     /// | upper and lower arm, upper and lower leg | D&C: 0.186, 0.146, 0.245, 0.246 |
-    /// | trunk | D&C: shoulders at 0.818 of the stature, hips at 0.530; the base of the neck 0.012 higher (our choice) |
-    /// | head | the remainder to 1 above hips and trunk: 0.170 |
+    /// | trunk | D&C: shoulders at 0.818 of the stature, hips at 0.530; the base of the neck is 0.012 higher than the shoulders (our choice) |
+    /// | head | what remains of the stature above the trunk: 0.170 |
     /// | shoulder width | ANSUR II: 0.2328, less 0.01 on either side to the centre of the joint (our choice) |
     /// | hip width | 72 % of the distance between the iliac spines (Bell, Pedersen & Brand 1990), which is about 24 cm: 0.100 |
-    /// | shoulder to neck | half the width, and 0.02 higher: 0.110 |
+    /// | shoulder to neck | half the shoulder width, with the neck 0.02 higher: 0.110 |
     ///
-    /// The shares of children are our own. They add up to 1 from ankle (0.045 above the floor) to vertex. The head is about a fifth of the
-    /// stature, whereas in adults it is 0.13 (D&C) plus a neck. The sitting height is about 0.57 of the stature at three years and 0.52 for
-    /// adults (Fredriks et al. 2005), so the legs are shorter by a ninth. The arms are shorter by a twentieth.
+    /// The fractions for children are our own. From the ankle (0.045 above the floor) to the top of the head, they add up to 1. The head is
+    /// about a fifth of the stature, whereas in adults it is 0.13 (D&C) plus a neck. The sitting height is about 0.57 of the stature at
+    /// three years and 0.52 for adults (Fredriks et al. 2005), so the legs are shorter by a ninth than in adults. The arms are shorter by a
+    /// twentieth.
     ///
-    /// `place` and `posture` are our own. Data sets differ most in the points that they call hips, neck and top of the head. Backs bend,
-    /// heads nod and shoulders shrug, whereas limbs keep their lengths except for the skin under markers.
+    /// `place` and `posture` are our own. Data sets differ most in which points they call hips, neck and top of the head. Backs bend, heads
+    /// nod and shoulders shrug, whereas limbs keep their lengths except for the skin under markers.
     pub const fn proportion(self) -> Proportion {
         let [adult, child, people, place, posture] = match self {
             Self::UpperArm => [0.186, 0.178, 0.032, 0.045, 0.02],

@@ -1,4 +1,4 @@
-//! Maximum distance of two joints if the joints between them are missing.
+//! Maximum distance between two joints if the joints between them are missing.
 
 use crate::body::bone::{
     BONES, L_ELBOW, L_HIP, L_KNEE, L_SHOULDER, NECK, R_ELBOW, R_HIP, R_KNEE, R_SHOULDER, joints_of,
@@ -6,7 +6,7 @@ use crate::body::bone::{
 use crate::body::proportion::Kind;
 use crate::body::{Joints, N_JOINTS};
 
-/// The next joint towards the neck, and the kind of bone between them; for a hip, half the width of the hips is added.
+/// For each joint, the next joint towards the neck and the kind of bone between them. For a hip, half the width of the hips is added.
 const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
     Some((R_KNEE, Kind::LowerLeg)),
     Some((R_HIP, Kind::UpperLeg)),
@@ -24,12 +24,12 @@ const TOWARDS_NECK: [Option<(usize, Kind)>; N_JOINTS] = [
     Some((NECK, Kind::Head)),
 ];
 
-/// Rank of a joint by its distance from the trunk: 0 for the neck, 3 for the ends.
+/// Rank of a joint by its distance from the trunk: from 0 for the neck to 3 for ankles, wrists and the top of the head.
 pub(crate) const RANK: [u32; N_JOINTS] = [3, 2, 1, 1, 2, 3, 3, 2, 1, 1, 2, 3, 0, 3];
 
 /// Returns the sum of the lengths of the bones from one joint to another, in metres.
 ///
-/// * `length`: returns the length of a kind of bone, in metres.
+/// * `length`: function that returns the length of a kind of bone, in metres.
 pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
     let mut ends = [a, b];
     let mut sum = 0.0;
@@ -38,7 +38,7 @@ pub(crate) fn between(a: usize, b: usize, length: impl Fn(Kind) -> f64) -> f64 {
         if is_hip(ends[0]) && is_hip(ends[1]) {
             return sum + length(Kind::HipWidth);
         }
-        // The end that is farther from the neck moves; between a leg and an arm, both ends move eventually.
+        // The end that is farther from the neck moves; if one end is on a leg and the other on an arm, both move in turn.
         let far = usize::from(RANK[ends[1]] > RANK[ends[0]]);
         let Some((next, kind)) = TOWARDS_NECK[ends[far]] else {
             return sum;

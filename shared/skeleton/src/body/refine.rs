@@ -15,11 +15,11 @@ use rows::{Linear, N_ROWS, Row, State};
 const UNKNOWN_SD: f64 = 0.05;
 /// Minimum variance, added to every covariance, in square metres: 1 mm squared.
 const LEAST_VARIANCE: f64 = 1e-6;
-/// Variance of the stature around its initial value from the bones, in square metres; so wide that it has no effect.
+/// Variance of the stature around its initial value from the bones, in square metres; it is so large that it has no effect.
 const STATURE_VARIANCE: f64 = 0.25;
 /// Stature assumed for a skeleton whose stature is unknown, in metres.
 const ANY_STATURE: f64 = 1.65;
-/// A bone that is off by more than this many standard deviations, including the uncertainty of its joints, loses its pull.
+/// Number of standard deviations, including the uncertainty of its joints, beyond which a bone no longer pulls its joints.
 const LOSS: f64 = 3.5;
 const MAX_ITERATIONS: usize = 10;
 /// The iteration ends if no joint moves by more than this, in metres.
@@ -38,18 +38,18 @@ pub struct Refined {
 
 /// Moves joints so that bones get their expected lengths, in proportion to the uncertainty of the joints.
 ///
-/// Minimises the squared Mahalanobis distances of the joints from their triangulated positions. For every bone, it adds
-/// `ρ(((|a - b| - expected) / spread)²)`. The expected length is the learned length. Its spread covers the remaining uncertainty and the
-/// effect of posture, at least 1.5 cm. If nothing was learned, the expected length is the bone's share of the stature, with the spread of
-/// people; the stature is then estimated along with the joints. The bones of the two sides are equal within 1.5 cm. The loss
-/// `ρ(s) = s / (1 + s / c²)` releases a bone that neither its spread nor the covariances of its joints explain, so that it does not drag
-/// its neighbours.
+/// Minimises the squared Mahalanobis distances of the joints from their triangulated positions. For every bone, it adds `ρ(((|a - b| -
+/// expected) / spread)²)`. The expected length is the learned length. Its spread covers the remaining uncertainty and the effect of
+/// posture, and is at least 1.5 cm. If no length was learned, the expected length follows from the stature, with the spread among people;
+/// the stature is then estimated together with the joints. Left and right bones are expected to be equal, with a standard deviation of 1.5
+/// cm. The loss `ρ(s) = s / (1 + s / c²)` reduces the effect of a bone whose length is not explained by its spread or by the covariances of
+/// its joints, so that it does not drag its neighbours.
 ///
 /// The method is Gauss-Newton with step halving. The normal equations are solved in the space of the bones, with 19 rows for up to 42
 /// coordinates. The covariances of the result are blocks of the inverse of the normal matrix. They are only as good as the given
 /// covariances; if these are too small, the joints hardly move.
 ///
-/// * `covariances`: a joint without a positive definite covariance is assumed to be known to 5 cm.
+/// * `covariances`: for a joint without a positive definite covariance, a standard deviation of 5 cm is assumed.
 /// * Returns the joints unchanged, with the covariances that were used, if there is no bone or the numbers
 ///   diverge.
 pub fn refine(joints: &Joints, covariances: &Covariances, lengths: Option<&Lengths>) -> Refined {
@@ -83,7 +83,7 @@ type Normal = Cholesky<f64, Const<N_ROWS>>;
 /// The rows linearised at a state, in the space of the bones.
 struct About {
     linear: [Option<Linear>; N_ROWS],
-    /// Covariance times derivatives: how the joints respond to a row.
+    /// Product of covariance and derivatives: how the joints respond to a row.
     follow: [[Vector3<f64>; N_JOINTS]; N_ROWS],
     /// Factorisation of `J C Jᵀ + variances`.
     normal: Normal,

@@ -6,9 +6,9 @@ use crate::body::proportion::{Kind, MEASUREMENT_SD};
 
 /// Minimum and maximum stature of a person, in metres.
 ///
-/// Our own choice. A child of one or two years, who can hardly stand, is below the minimum (WHO Child Growth Standards 2006: the median at
-/// two years is about 0.86 m). Only a handful of living people are above the maximum (ANSUR II: men 1.756 ± 0.069 m, women 1.629 ± 0.064
-/// m).
+/// The values are our own choice. A child of one or two years, who can hardly stand, is below the minimum (WHO Child Growth Standards 2006:
+/// the median at two years is about 0.86 m). Only a handful of living people are above the maximum (ANSUR II: men 1.756 ± 0.069 m, women
+/// 1.629 ± 0.064 m).
 pub const STATURES: [f64; 2] = [0.80, 2.30];
 
 /// Minimum number of bones for any statement about a person.
@@ -26,9 +26,8 @@ pub struct Stature {
 /// Returns the standing height of a person from the joints, in any posture; `None` if there are fewer than [`MIN_BONES`]
 /// bones.
 ///
-/// The height is the median of the estimates from single bones, weighted by their precision, so one wrong limb has little effect. The
-/// uncertainty is that of a weighted median of independent bones or that of the observed disagreement, whichever is
-/// larger.
+/// The height is the median of the estimates from single bones, weighted by their precision, so that one wrong limb has little effect. The
+/// uncertainty is the larger of two values: that of a weighted median of independent bones, and that of the observed disagreement.
 pub fn stature(joints: &Joints) -> Option<Stature> {
     of_lengths(&bone::lengths(&bone::clean(joints)))
 }
@@ -43,7 +42,7 @@ pub(crate) fn of_lengths(lengths: &[Option<f64>; N_BONES]) -> Option<Stature> {
         vote[0] = (vote[0] - metres).abs();
     }
     sorted.sort();
-    // The first factor converts a median absolute deviation to a standard deviation, the second factor converts this to the standard
+    // The first factor converts a median absolute deviation to a standard deviation, and the division converts this to the standard
     // deviation of a median; both assume a normal distribution.
     let seen = 1.4826 * sorted.median() / n.sqrt();
     let sd = 1.2533 * (model * metres).max(seen);

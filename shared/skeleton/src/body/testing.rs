@@ -49,8 +49,7 @@ pub(crate) fn reaching(stature: f64) -> Joints {
 
 pub(crate) const POSTURES: [fn(f64) -> Joints; 5] = [standing, walking, sitting, bent, reaching];
 
-/// * `angles`: angles of hips, knees, shoulders and elbows, right and left, forwards (knees back); `lean`: angle of the trunk; all in
-///   radians.
+/// * `angles`: forward angles of hips, knees (backward), shoulders and elbows, right and left; `lean`: angle of the trunk; all in radians.
 fn posed(stature: f64, angles: [[f64; 2]; 4], lean: f64) -> Joints {
     let [hips, knees, shoulders, elbows] = angles;
     let of = |kind: Kind| kind.proportion().length(stature);
@@ -84,7 +83,7 @@ fn posed(stature: f64, angles: [[f64; 2]; 4], lean: f64) -> Joints {
     joints
 }
 
-/// Adds normal noise with standard deviations along x and across x, in metres.
+/// Adds normal noise with the given standard deviations along x and perpendicular to x, in metres.
 pub(crate) fn noisy(
     joints: &Joints,
     depth: f64,

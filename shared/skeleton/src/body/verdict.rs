@@ -1,4 +1,4 @@
-//! The verdict on a skeleton, and the reason if it is not a person's.
+//! The verdict on a skeleton, and the reason if it cannot be a person's.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use crate::body::bone::clean;
 use crate::body::stature::Stature;
 use crate::body::{Joints, N_JOINTS};
 
-/// Reason why a skeleton is not a person's.
+/// Reason why a skeleton cannot be a person's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Reason {
     /// Too few bones are known.
@@ -16,14 +16,14 @@ pub enum Reason {
         /// Minimum number of such bones.
         needed: usize,
     },
-    /// The stature is impossible for any person, or for the person with the learned lengths.
+    /// The stature is impossible for any person, or for the person whose lengths were learned.
     Stature {
         /// The stature on which the bones agree, in metres.
         metres: f64,
         /// Minimum and maximum possible stature, in metres.
         limits: [f64; 2],
     },
-    /// More than half of the bones have lengths that no person of this stature has.
+    /// More than half of the bones have lengths that are impossible for a person of this stature.
     Impossible {
         /// Number of impossible bones.
         impossible: usize,
@@ -55,14 +55,15 @@ impl fmt::Display for Reason {
 /// The verdict on a skeleton.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// The standing height, from the kept joints, or from all joints if the skeleton is not a person's. `None` if there are too few bones.
+    /// The standing height, computed from the kept joints, or from all joints if the skeleton cannot be a person's. `None` if there are too
+    /// few bones.
     pub stature: Option<Stature>,
-    /// Root mean square deviation of the bone lengths from the expected lengths, in standard deviations; 0 to 1
-    /// is ordinary. Computed from the kept joints, or from all joints if the skeleton is not a person's; 0 without bones.
+    /// Root mean square deviation of the bone lengths from the expected lengths, in standard deviations; values from 0 to 1 are usual. It
+    /// is computed from the kept joints, or from all joints if the skeleton cannot be a person's; 0 without bones.
     pub deviation: f64,
-    /// The joints of impossible bones, which must not be reported. A missing joint is not dropped.
+    /// For every joint, true if it makes a bone impossible and must not be reported. A missing joint is not dropped.
     pub dropped: [bool; N_JOINTS],
-    /// Reason why the skeleton is not a person's; if set, no joint must be reported.
+    /// Reason why the skeleton cannot be a person's; if set, no joint must be reported.
     pub nobody: Option<Reason>,
 }
 

@@ -8,7 +8,7 @@ use messages::{
 use recording::{Envelope, Kind, encode, split_skeletons};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
 
-/// A message as bytes, and the fields of its envelope.
+/// A message as bytes, with the fields that describe it.
 #[derive(Debug)]
 pub struct Received {
     /// Session of the message.
@@ -17,14 +17,14 @@ pub struct Received {
     pub frame: u64,
     /// Time at which the message was sent, in nanoseconds; 0 if unknown.
     pub sent_at: u64,
-    /// States whether the message carries a result, and if not, why. Heartbeats always carry a result.
+    /// Whether the message carries a result and, if not, why. Heartbeats always carry a result.
     pub status: Status,
-    /// For heartbeats and for pictures of cameras, which are numbered: the epoch of the process, and the number of messages that it has
-    /// sent in this epoch.
+    /// Only for heartbeats and for pictures of cameras, which are numbered: the epoch (number of restarts) of the process, and the number
+    /// of messages that it has sent in this epoch.
     pub life: Option<[u64; 2]>,
-    /// For poses of a view: true if evidence was sent with them.
+    /// Only for poses of a view: true if evidence was sent with them.
     pub has_evidence: bool,
-    /// The message in the form in which it is written into a recording; `None` if there is no room for it.
+    /// The message in the form in which it is written to a recording; `None` if there is no room for it.
     pub data: Option<Vec<u8>>,
 }
 
@@ -90,7 +90,7 @@ impl Receiver {
 
     /// Returns the oldest waiting message.
     ///
-    /// * `room`: returns true if there is room for a number of bytes.
+    /// * `room`: function that returns true if there is room for the given number of bytes.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl Receiver {
             Port::Picture(port) => port.receive()?.and_then(|sample| {
                 let head = sample.header();
                 let received = of(bytes_of(head), sample.payload())?;
-                // The frame number at the end of the pictures is their total number.
+                // At the end of the pictures, the frame number is their total number.
                 let is_one = head.status != Status::END;
                 let n_sent = head.stamp.frame.saturating_add(u64::from(is_one));
                 Some(Received {

@@ -79,7 +79,8 @@ impl Sender {
         }
     }
 
-    /// Sends a message with another envelope. A message without its array is sent with one element of value 0.
+    /// Sends a message with the given envelope instead of its own. If the message has no array, it is sent with an array of one element of
+    /// value 0.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Tests of joins, with inputs made of lists, and a clock that the tests set.
+//! Tests of joining messages, with lists as inputs, and with a clock that the tests set.
 
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, VecDeque};
@@ -16,7 +16,7 @@ use crate::{Account, Port, Receive, Sender, Stamped};
 const SESSION: u64 = 7;
 const PATIENCE: Duration = Duration::from_nanos(100);
 
-/// A topic made of a list. A sent message is appended to the list.
+/// A topic backed by a list. Sending a message appends it to the list.
 #[derive(Debug)]
 struct Topic<M> {
     waiting: Rc<RefCell<VecDeque<M>>>,

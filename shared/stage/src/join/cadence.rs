@@ -1,19 +1,18 @@
-//! Chooses the frames that a stage processes if it cannot process all frames, so that all stages choose the same frames.
+//! Chooses which frames a stage processes if it cannot process all of them, so that all stages choose the same frames.
 
 /// Number of consecutive frames that must be too slow, or fast, before the stride changes.
 const N_SLOW: u32 = 3;
 const N_FAST: u32 = 8;
-/// Maximum share of the available time that a frame may need for the stride to be halved.
+/// Maximum fraction of the available time that processing may take for the stride to be halved.
 const HALVING_LOAD: f64 = 0.7;
 /// Maximum stride.
 const MAX_STRIDE: u64 = 1 << 16;
 
-/// Chooses the number of frames to skip with realtime delivery.
+/// Decides which frames a stage skips with realtime delivery.
 ///
-/// If every stage processed the newest frame whenever it is idle, stages would process different frames, and their
-/// messages could not be joined. A stage therefore processes only every n-th frame. n is a power of two and follows from the
-/// measured processing time. The frames of the slowest stage are then among those of all other stages, without any
-/// communication between stages.
+/// If every stage processed the newest frame whenever it is idle, stages would process different frames, and their messages could not be
+/// joined. A stage therefore processes only every n-th frame, where n is a power of two that depends on the measured processing time. All
+/// other stages then process the frames of the slowest stage as well, without any communication between stages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cadence {
     stride: u64,
@@ -49,7 +48,7 @@ impl Cadence {
 
     /// Records that a frame was processed.
     ///
-    /// * `captured_at_nanos`: capture time, from which the time between frames follows.
+    /// * `captured_at_nanos`: capture time, from which the time between frames is computed.
     /// * `busy_nanos`: the processing time.
     pub fn processed(&mut self, nth: u64, captured_at_nanos: u64, busy_nanos: u64) {
         let last = self.last.replace((nth, captured_at_nanos));
@@ -88,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns the processed frames if frames are 100 ns apart and take `busy` ns each.
+    /// Returns the frames that are processed if frames are 100 ns apart and each takes `busy` ns.
     fn taken(cadence: &mut Cadence, frames: core::ops::Range<u64>, busy: u64) -> Vec<u64> {
         let mut free_at = 0;
         let mut taken = Vec::new();

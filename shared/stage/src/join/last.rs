@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-/// Number of messages kept per input, because an input may be ahead of the frame that is being processed.
+/// Number of messages that are kept for each input. It is more than one because an input may be ahead of the frame that is being processed.
 const KEPT: usize = 4;
 
-/// Keeps the last messages of several inputs while they are fresh.
+/// Keeps the last messages of several inputs until they are too old.
 #[derive(Debug)]
 pub struct Last<T> {
     of_input: Vec<VecDeque<Message<T>>>,
@@ -49,7 +49,7 @@ impl<T> Last<T> {
         }
     }
 
-    /// Returns the latest message about this frame or an earlier one, if it is fresh, and its age in frames.
+    /// Returns the latest message about this frame or an earlier one, with its age in frames, unless it is too old.
     pub fn of(&self, input: usize, frame: u64, captured_at: u64) -> Option<(u64, &T)> {
         let messages = self.of_input.get(input)?;
         let latest = messages.iter().rev().find(|message| message.frame <= frame)?;

@@ -35,7 +35,7 @@ fn men_women_and_children_are_possible_in_every_posture() {
 
 #[test]
 fn unusual_builds_are_possible() {
-    // Legs or arms longer by three standard deviations among people.
+    // Legs or arms that are longer than average by three standard deviations among people.
     for (joints, share) in [([0, 1, 4, 5], 0.13), ([6, 7, 10, 11], 0.12)] {
         for tall in [0.95, 1.76] {
             let mut person = testing::standing(tall);
@@ -118,7 +118,7 @@ fn an_arm_over_a_metre_long_loses_its_joint() {
     assert_eq!(dropped(&moved(&person, 11, [0.0, 0.7, 0.3])), [11]);
     // The elbow makes both bones impossible; the wrist may stay because it is within reach.
     assert_eq!(dropped(&moved(&person, 7, [0.7, 0.3, 0.0])), [7]);
-    // Both joints are dropped: without the elbow, the wrist is connected to nothing and out of reach.
+    // Both joints are dropped: without the elbow, the wrist is not connected to anything, and is out of reach.
     let both = moved(&moved(&person, 7, [0.8, 0.0, 0.0]), 6, [-0.3, -1.2, 0.0]);
     assert_eq!(dropped(&both), [6, 7]);
 }
@@ -150,7 +150,7 @@ fn a_wrist_whose_elbow_is_missing_is_judged_by_its_reach() {
 
 #[test]
 fn sides_that_differ_too_much_lose_a_joint() {
-    // Each length alone is possible.
+    // Each of the lengths is possible on its own.
     let person = testing::standing(1.75);
     let uneven = moved(&moved(&person, 0, [0.0, 0.0, -0.15]), 5, [0.0, 0.0, 0.17]);
     assert_eq!(
@@ -198,7 +198,7 @@ fn learned_lengths_narrow_the_limits() {
     let person = testing::walking(1.75);
     let mut lengths = Lengths::default();
     testing::learn(&mut lengths, &person);
-    // The trunk is too short for this person, but possible for people in general.
+    // The trunk is too short for this person, although it is possible for people in general.
     let short = moved(&person, 12, [0.0, 0.0, -0.225]);
     let trunk = |lengths| Judgement::new(&short, lengths).z[12].unwrap().abs();
     assert!(trunk(None) < LIMIT && trunk(Some(&lengths)) > LIMIT);
@@ -212,7 +212,7 @@ fn the_person_that_was_learned_does_not_shrink() {
     assert_eq!(verdict(&child).nobody, None);
     let reason = check(&child, &NO_COVARIANCES, Some(&lengths)).nobody;
     assert!(matches!(reason, Some(Reason::Stature { .. })), "{reason:?}");
-    // The same person in another posture, half hidden, is accepted.
+    // The same person, half hidden and in another posture, is accepted.
     let mut person = testing::reaching(1.65);
     for joint in [0, 1, 4, 5, 10, 11] {
         person[joint] = None;

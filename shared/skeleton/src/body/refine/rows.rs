@@ -1,4 +1,4 @@
-//! Expectations for bones, as residuals of joints and stature, with their derivatives.
+//! Expectations about bones, written as residuals that depend on joints and stature, with their derivatives.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::body::check::expected;
 use crate::body::lengths::Lengths;
 use crate::body::{Joints, N_JOINTS};
 
-/// One row for every bone, then one for every pair of sides.
+/// One row for every bone, then one for every pair of a left and a right bone.
 pub(super) const N_ROWS: usize = N_BONES + SIDES.len();
 
 /// Minimum standard deviation of a bone's length, in metres.
@@ -57,9 +57,9 @@ pub(super) struct Row {
 enum Of {
     /// A bone has its learned length.
     Learned { bone: usize, metres: f64 },
-    /// A bone has its share of the stature.
+    /// A bone has the fraction of the stature that is expected for its kind.
     Share { bone: usize },
-    /// The bones of the two sides are equally long.
+    /// The left and the right bone are equally long.
     Sides { right: usize, left: usize },
 }
 

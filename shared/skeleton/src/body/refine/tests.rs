@@ -3,7 +3,7 @@
 use super::*;
 use crate::body::testing::{self, NO_COVARIANCES, POSTURES};
 
-/// Returns covariances of the noise: 5 cm along x, 1 cm across.
+/// Returns the covariances of the noise: a standard deviation of 5 cm along x and 1 cm perpendicular to it.
 fn depth_noise() -> Covariances {
     [Some(Matrix3::from_diagonal(&Vector3::new(25e-4, 1e-4, 1e-4))); N_JOINTS]
 }
@@ -158,7 +158,7 @@ fn the_result_is_a_minimum() {
     );
     let mut state = problem.measured;
     state.joints = found.joints.map(|joint| joint.unwrap().coords);
-    // The result does not contain the stature; use the best one for these joints.
+    // The result does not contain the stature; the best stature for these joints is used.
     let cost = |state: &State| {
         let of = |mm: i32| State {
             stature: 1.2 + f64::from(mm) / 1000.0,
