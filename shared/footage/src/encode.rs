@@ -8,11 +8,11 @@ use crate::source::log::Log;
 use crate::source::program::missing;
 use crate::{FootageError, Size};
 
-/// Quality of H.264, from 0 (lossless) to 51, and of MPEG-4, from 1 (best) to 31.
+/// Quality of H.264, from 0 (lossless) to 51; the next constant is the quality of MPEG-4, from 1 (best) to 31.
 const H264_CRF: &str = "20";
 const MPEG4_QUALITY: &str = "3";
 
-/// A video that is being written: MP4 with H.264 if `ffmpeg` supports it, otherwise MPEG-4.
+/// A video that is being written: an MP4 file with H.264 if `ffmpeg` supports H.264, otherwise with MPEG-4.
 ///
 /// The file is complete only after [`finish`](Self::finish) has returned. Dropping the writer before that kills the process.
 #[derive(Debug)]
@@ -28,8 +28,8 @@ pub struct VideoWriter {
 impl VideoWriter {
     /// Starts the encoder. An existing file is replaced.
     ///
-    /// * `path`: the file, which may have any name and becomes an MP4.
-    /// * `size`: size of the pictures. A side with an odd number of pixels grows by a black row or column, as the format requires.
+    /// * `path`: the file, which may have any name; its content is MP4.
+    /// * `size`: size of the pictures. If a side has an odd number of pixels, a black row or column is added, as the format requires.
     /// * `ffmpeg`: the executable.
     ///
     /// # Errors
@@ -142,7 +142,7 @@ impl VideoWriter {
 
 impl Drop for VideoWriter {
     fn drop(&mut self) {
-        // After the end, both calls fail, and nothing is left to do.
+        // If the process has already ended, both calls fail, and there is nothing left to do.
         drop(self.child.kill());
         drop(self.child.wait());
     }

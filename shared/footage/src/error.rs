@@ -8,23 +8,23 @@ use crate::Size;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FootageError {
-    /// There is no file, folder or match with this name.
+    /// No file or folder has this name, and nothing matches it as a pattern.
     #[error("no such footage: {path}{}", what_is_missing(path))]
     NotFound {
         /// Path as the user wrote it.
         path: String,
     },
-    /// The path is a camera, a stream or a device.
+    /// The path is the address of a camera, a stream or a device.
     #[error("{path} is {what}, but footage is expected: {instead}")]
     Live {
         /// Path as the user wrote it.
         path: String,
         /// Kind of source.
         what: &'static str,
-        /// Remedy: the input to use instead.
+        /// What to do: the input to use instead.
         instead: String,
     },
-    /// The name is empty.
+    /// The name of the footage is empty.
     #[error("the footage has no name: it is \"\"")]
     NoName,
     /// The name is not UTF-8, and the conversion changed it.
@@ -44,7 +44,7 @@ pub enum FootageError {
         /// Position and cause of the error.
         source: glob::PatternError,
     },
-    /// The folder or pattern has no image.
+    /// The folder contains no image, or no image matches the pattern.
     #[error("no image (png, jpg, jpeg, bmp) in {path}")]
     NoImages {
         /// Path as the user wrote it.
@@ -176,7 +176,7 @@ pub enum FootageError {
     },
 }
 
-/// Returns a hint for the message: the missing folder, or the correct name of a webcam as a source.
+/// Returns a hint for the message: which folder is missing, or how to write the name of a webcam.
 fn what_is_missing(path: &str) -> String {
     let path = Path::new(path);
     let name = path.file_name().unwrap_or_default().to_string_lossy();

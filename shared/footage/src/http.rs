@@ -1,4 +1,4 @@
-//! Checks the answers of HTTP cameras in which a decoder finds no pictures.
+//! Finds out what an HTTP camera has answered if a decoder found no pictures in its answer.
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::net::{TcpStream, ToSocketAddrs as _};
@@ -9,7 +9,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Maximum size of an answer's head, in bytes.
 const MAX_HEAD: u64 = 16 << 10;
 
-/// Kind of answer.
+/// What a camera has answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Answer {
     /// The answer is one picture, not a stream.
@@ -19,7 +19,7 @@ pub(crate) enum Answer {
 }
 
 impl Answer {
-    /// Returns the message for the answer.
+    /// Returns the error message for this answer.
     pub(crate) fn complaint(self) -> String {
         match self {
             Self::Picture => {
@@ -36,12 +36,12 @@ impl Answer {
     }
 }
 
-/// Requests an address of `http://` and returns the kind of the answer. Returns `None` if there is no answer, or if the answer may be
+/// Requests an `http://` address, and returns what kind of answer came back. Returns `None` if there is no answer, or if the answer may be
 /// a stream.
 pub(crate) fn ask(address: &str) -> Option<Answer> {
     let (scheme, rest) = address.split_once("://")?;
     let (host, path) = rest.split_at(rest.find(['/', '?']).unwrap_or(rest.len()));
-    // A camera refuses a request without its password. With TLS, the answer cannot be read.
+    // Without its password, a camera rejects the request; with TLS, the answer cannot be read.
     if !scheme.eq_ignore_ascii_case("http") || host.contains('@') {
         return None;
     }

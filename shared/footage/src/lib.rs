@@ -1,9 +1,8 @@
 //! Reads image sequences and videos, warps images into a given buffer, draws overlays, writes videos, and paces
 //! frames.
 //!
-//! Every image is 8-bit RGB, row major, `width * height * 3` bytes. A point is `[x, y]` in pixels, with
-//! the centre of the top-left pixel at `(0, 0)`. This crate does not depend on cameras or skeletons: its
-//! input is affine maps and points.
+//! Every image is 8-bit RGB, row major, `width * height * 3` bytes. A point is `[x, y]` in pixels, with the centre of the top-left pixel at
+//! `(0, 0)`. This crate knows nothing about cameras or skeletons: it takes affine maps and points.
 #![forbid(unsafe_code)]
 
 mod error;

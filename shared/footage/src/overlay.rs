@@ -63,7 +63,7 @@ pub struct Limb {
 
 /// Returns the line width that is visible on a picture of this size: 1/240 of its height, at least 1.5 pixels.
 ///
-/// The width suits a person who fills the picture. Other marks are drawn in proportion to it.
+/// This width suits a person who fills the picture. The sizes of other marks are proportional to it.
 pub fn line_width(size: Size) -> f64 {
     (size.height as f64 / 240.0).max(1.5)
 }

@@ -1,9 +1,9 @@
 //! The times at which frames are due.
 
-/// Computes when frame `k` is due on a clock that the caller reads: `start + k / rate`.
+/// Computes the time at which frame `k` is due, `start + k / rate`, on a clock that the caller reads.
 ///
-/// All cameras of a deployment share the start, so that frames with the same index are due together. This type does not
-/// read a clock and does not sleep.
+/// All cameras of a deployment have the same start, so that frames with the same index are due at the same time. This type does not read a
+/// clock and does not sleep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pacer {
     start_nanos: u64,
@@ -11,7 +11,7 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Returns a pacer with which every frame is due at once.
+    /// Returns a pacer for which every frame is due immediately.
     pub const fn as_fast_as_possible() -> Self {
         Self {
             start_nanos: 0,
@@ -19,7 +19,7 @@ impl Pacer {
         }
     }
 
-    /// Returns a pacer with which frame `k` is due `k / rate_hz` seconds after `start_nanos`.
+    /// Returns a pacer for which frame `k` is due `k / rate_hz` seconds after `start_nanos`.
     ///
     /// # Panics
     ///
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn a_fractional_rate_does_not_drift_within_a_day() {
         let pacer = Pacer::realtime(0, 60_000.0 / 1001.0);
-        // 60 000 frames take 1001 seconds.
+        // At 60 000 / 1001 Hz, 60 000 frames take 1001 seconds.
         assert_eq!(pacer.due_nanos(60_000 * 86), 1001 * 86 * 1_000_000_000);
     }
 

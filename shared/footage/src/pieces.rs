@@ -1,4 +1,4 @@
-//! A stream in its original form: the packets of `ffmpeg` in a Matroska stream, cut so that every picture is a piece.
+//! A live stream in its original form: the packets of `ffmpeg` in a Matroska stream, split so that every picture is a separate piece.
 
 use std::io::{self, Read};
 use std::sync::Arc;
@@ -13,11 +13,12 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Kind of a piece of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PieceKind {
-    /// The head, which says how to decode the following pictures. There is one before every picture that needs no other picture.
+    /// The head, which describes how to decode the pictures after it. There is a head before every picture that can be decoded without
+    /// other pictures.
     Head,
-    /// A picture that needs no other picture.
+    /// A picture that can be decoded without other pictures.
     Key,
-    /// A picture that needs the pictures before it.
+    /// A picture that can only be decoded together with the pictures before it.
     Other,
 }
 
@@ -53,7 +54,7 @@ impl Pieces {
                     counted.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            // Data that cannot be cut are dropped, because the decoder must not wait for a pipe that is not read.
+            // Data that cannot be split is read and dropped, because the decoder would otherwise wait for the pipe.
             io::copy(&mut cutter.input, &mut io::sink()).ok();
         })?;
         Ok(Self { waiting, n_lost })
@@ -97,7 +98,7 @@ impl<R: Read> Cutter<R> {
         }
     }
 
-    /// Returns the next piece; `None` at the end of the stream.
+    /// Returns the next piece, or `None` at the end of the stream.
     fn next(&mut self) -> io::Result<Option<Piece>> {
         if let Some(piece) = self.after_head.take() {
             return Ok(Some(piece));
@@ -107,7 +108,7 @@ impl<R: Read> Cutter<R> {
             let Some((id, length)) = self.element(&mut bytes)? else {
                 return Ok(None);
             };
-            // The segment has no known end: its elements follow directly.
+            // The length of the segment is unknown: its elements follow directly.
             if id != id::SEGMENT {
                 let begin = bytes.len();
                 let length = length.filter(|length| *length <= MAX_BYTES);
@@ -128,7 +129,7 @@ impl<R: Read> Cutter<R> {
         }
     }
 
-    /// Returns the piece of a cluster, or the head before it.
+    /// Returns the piece made from a cluster, or the head before it.
     fn picture(&mut self, begin: usize, bytes: Vec<u8>) -> Piece {
         let (nanos, is_key) = looked_into(&bytes[begin..]);
         let kind = if is_key {
@@ -176,7 +177,7 @@ impl<R: Read> Cutter<R> {
     }
 }
 
-/// Reads a number of variable length with its marker; `None` for "not known", which is all ones.
+/// Reads a number of variable length with its marker; `None` if all its bits are ones, which means that the number is unknown.
 fn number(bytes: &[u8]) -> Option<u64> {
     let all = bytes.iter().fold(0_u64, |sum, it| sum << 8 | u64::from(*it));
     let mask = (1_u64 << (7 * bytes.len())) - 1;
@@ -197,7 +198,7 @@ fn split(bytes: &[u8]) -> Option<(u32, &[u8], &[u8])> {
     Some((id, inside, after))
 }
 
-/// Returns the time in nanoseconds of the first picture of a cluster, and whether this picture needs no other.
+/// Returns the time in nanoseconds of the first picture of a cluster, and whether this picture can be decoded without other pictures.
 fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
     let mut base = 0_i64;
     while let Some((id, inside, after)) = split(cluster) {
@@ -222,7 +223,7 @@ fn looked_into(mut cluster: &[u8]) -> (u64, bool) {
     (base.max(0).cast_unsigned().saturating_mul(1_000_000), false)
 }
 
-/// Returns the block of a group, and whether it needs no other block.
+/// Returns the block of a group, and whether it can be decoded without other blocks.
 fn group(mut inside: &[u8]) -> (&[u8], bool) {
     let (mut block, mut is_key) = (&[][..], true);
     while let Some((id, it, after)) = split(inside) {

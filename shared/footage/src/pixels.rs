@@ -12,7 +12,7 @@ pub enum PixelFormat {
     Yuyv,
     /// `U Y V Y` for two adjacent pixels.
     Uyvy,
-    /// All `Y`, then `U V` for every four pixels.
+    /// All `Y` values, followed by `U V` for every four pixels.
     Nv12,
     /// Brightness only.
     Grey,
@@ -54,9 +54,9 @@ impl PixelFormat {
         Self::ALL.into_iter().find(of)
     }
 
-    /// Converts a picture to RGB. Returns `false` if it is damaged, cut off or of another size.
+    /// Converts a picture to RGB. Returns `false` if it is damaged, truncated or of another size.
     ///
-    /// Brightness and colour are read as BT.601 with values from 16 to 235, which webcams use.
+    /// Brightness and colour are interpreted as BT.601 with values from 16 to 235, as used by webcams.
     ///
     /// * `bytes_per_row`: bytes from one row to the next; 0 for rows without a gap.
     /// * `rgb`: `width * height * 3` bytes; undefined after `false`.
@@ -116,7 +116,7 @@ fn each(line: &mut [u8], pixels: impl Iterator<Item = [u8; 3]>) {
 fn pairs(from: &[u8], line: &mut [u8], [y0, u, y1, v]: [usize; 4]) {
     for (to, four) in line.chunks_mut(6).zip(from.chunks(4)) {
         let &[_, _, _, _] = four else {
-            // If the width is odd, the last pixel lacks the colour of its neighbour.
+            // If the width is odd, the colour information of the last pixel is incomplete.
             to.fill(four.get(y0).copied().unwrap_or(0));
             continue;
         };
@@ -162,7 +162,7 @@ mod tests {
         let two = Size::new(2, 1);
         let of = |bytes: &[u8]| rgb(PixelFormat::Yuyv, bytes, 0, two).unwrap();
         assert_eq!(of(&[16, 128, 235, 128]), [0, 0, 0, 255, 255, 255]);
-        // Red of the colour bars, from the table of BT.601.
+        // The red of the colour bars, from the table in BT.601.
         assert_eq!(of(&[81, 90, 81, 240]), [255, 0, 0, 255, 0, 0]);
         let uyvy = rgb(PixelFormat::Uyvy, &[90, 81, 240, 81], 0, two).unwrap();
         assert_eq!(uyvy, [255, 0, 0, 255, 0, 0]);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Runs a program to its end and returns its output; `None` if the time is over and the program was killed.
+/// Runs a program to its end, and returns its output; `None` if the time limit has passed and the program was killed.
 pub(crate) fn output_within(mut command: Command, limit: Duration) -> io::Result<Option<Output>> {
     const PAUSE: Duration = Duration::from_millis(10);
     let mut child = command

@@ -56,7 +56,7 @@ impl RemadeStream {
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         let thread = std::thread::Builder::new().name("pieces".to_owned());
         let fed = thread.spawn(move || {
-            // A decoder that has ended takes no more pieces.
+            // A decoder that has ended does not accept any more pieces.
             let mut pieces = pieces;
             pieces.all(|piece| stdin.write_all(&piece).is_ok());
         });

@@ -1,11 +1,11 @@
 //! The clock of an RTSP camera: the times of its sender reports, which `ffmpeg` writes beside the packets.
 //!
-//! An RTSP camera that knows the time sends RTCP sender reports from time to time (RFC 3550, 6.4.1). A report gives a time of the stream
-//! and the time of the camera's own clock. `ffmpeg` reports this neither to a program nor in its log, but writes it
-//! into fragmented MP4: a `prft` box before every fragment (ISO/IEC 14496-12, 8.16.5).
+//! An RTSP camera that knows the time sends RTCP sender reports from time to time (RFC 3550, 6.4.1). A report contains a time of the stream
+//! and the same moment on the camera's own clock. `ffmpeg` does not give these times to programs or write them to its log, but it writes
+//! them into fragmented MP4: a `prft` box before every fragment (ISO/IEC 14496-12, 8.16.5).
 //!
-//! Before the first report, and if a camera sends no reports, the box has the time at
-//! which the packet was written. This time jitters, whereas the camera's own time does not.
+//! Before the first report, or if a camera sends no reports, the box contains the time at which the packet was written. That time jitters,
+//! whereas the camera's own time does not.
 
 use std::io::{self, ErrorKind, PipeReader, PipeWriter, Read, pipe};
 use std::sync::Arc;
@@ -13,7 +13,8 @@ use std::sync::atomic::{AtomicI64, Ordering};
 
 use rustix::io::{FdFlags, fcntl_setfd};
 
-/// Number of consecutive offsets that must agree, and their tolerance, in nanoseconds: `ffmpeg` rounds to whole milliseconds.
+/// Number of consecutive offsets that must agree; the next constant is their tolerance in nanoseconds, because `ffmpeg` rounds to whole
+/// milliseconds.
 const N_EQUAL: usize = 16;
 const EQUAL_NANOS: i64 = 1_100_000;
 /// Seconds from 1900, where NTP begins, to 1970.
@@ -24,7 +25,7 @@ const UNKNOWN: i64 = i64::MIN;
 const MAX_HEAD: u64 = 1 << 20;
 const MAX_TIME: u64 = 64;
 
-/// Returns the options that write the times of a camera and its packets to a pipe. If the pipe cannot be written, the pictures are
+/// Returns the `ffmpeg` options that write a camera's times and packets to a pipe. If the pipe cannot be written to, the pictures are
 /// decoded nevertheless.
 ///
 /// * `pipe`: address of the pipe, with `:` escaped.
@@ -37,7 +38,7 @@ pub(crate) fn times_of_sender(pipe: &str) -> Vec<String> {
     all.map(str::to_owned).into()
 }
 
-/// Creates a pipe. Child processes inherit its writer until the writer is dropped.
+/// Creates a pipe. Child processes inherit the writing end until it is dropped.
 pub(crate) fn inherited_pipe() -> io::Result<(PipeReader, PipeWriter)> {
     let (reader, writer) = pipe()?;
     fcntl_setfd(&writer, FdFlags::empty())?;
@@ -62,27 +63,27 @@ impl SenderClock {
                     told.0.store(offset, Ordering::Relaxed);
                 }
             }
-            // The decoder must not wait for a pipe that is not read.
+            // The remaining data is read and dropped, because the decoder would otherwise wait for the pipe.
             io::copy(&mut boxes.input, &mut io::sink()).ok();
         })?;
         Ok(clock)
     }
 
-    /// Returns the camera's clock at time 0 of its stream, in nanoseconds since 1970 began; `None` before it is known.
+    /// Returns the camera's clock at time 0 of its stream, in nanoseconds since 1970; `None` if it is not known yet.
     pub(crate) fn offset_nanos(&self) -> Option<i64> {
         Some(self.0.load(Ordering::Relaxed)).filter(|offset| *offset != UNKNOWN)
     }
 }
 
-/// A time of the stream, and the time of the clock at that moment, in nanoseconds.
+/// A time of the stream, and the same moment on the clock, in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Told {
     presented: i64,
     unix: i64,
 }
 
-/// Distinguishes times of a camera from the times at which packets were written. Times of a camera have a constant distance to the times of
-/// the stream.
+/// Distinguishes times of a camera's clock from the times at which packets were written. A camera's times differ from the times of the
+/// stream by a constant offset.
 #[derive(Debug, Default)]
 struct Offsets(Vec<i64>);
 
@@ -117,7 +118,7 @@ impl<R: Read> Boxes<R> {
         }
     }
 
-    /// Returns the next stated time; `None` at the end of the stream.
+    /// Returns the next pair of times; `None` at the end of the stream.
     fn next(&mut self) -> io::Result<Option<Told>> {
         loop {
             let Some((kind, length)) = self.head()? else {
@@ -244,7 +245,7 @@ mod tests {
 
     /// Returns a `prft` box.
     ///
-    /// * `ms`: milliseconds since 1970 began.
+    /// * `ms`: milliseconds since 1970.
     fn time(units: u64, ms: u64) -> Vec<u8> {
         let seconds = (ms / 1000 + NTP_TO_UNIX_S as u64) << 32;
         let ntp = seconds | (((ms % 1000) << 32) / 1000);
@@ -298,7 +299,7 @@ mod tests {
         assert!((last - MS / 3).abs() < MS / 10, "{last}");
     }
 
-    /// Checks the output of the real program for packets that arrive all at once.
+    /// Checks the output of the real program for packets that arrive all at the same time.
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     #[test]
     fn every_picture_of_the_real_program_has_a_time() {

@@ -10,7 +10,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// Creates a size. The width comes first, as everywhere in this crate.
+    /// Creates a size. The width comes first, as everywhere else in this crate.
     pub const fn new(width: usize, height: usize) -> Self {
         Self { width, height }
     }
@@ -20,7 +20,7 @@ impl Size {
         self.width * self.height * 3
     }
 
-    /// Returns the size of an image that is smaller by a factor of at least 1.
+    /// Returns the size of the image after shrinking it by a factor of at least 1.
     #[must_use]
     pub const fn shrunk(self, by: usize) -> Self {
         Self::new(self.width / by, self.height / by)

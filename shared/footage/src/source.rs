@@ -36,7 +36,7 @@ use crate::{FootageError, Size, SourceSpec, Turn};
 pub enum SourceKind {
     /// One image, repeated.
     Still,
-    /// Images of a folder, glob or numbered pattern.
+    /// Images from a folder, a glob or a numbered pattern.
     Images,
     /// A video.
     Video,
@@ -49,24 +49,24 @@ pub struct SourceInfo {
     pub size: Size,
     /// Factor by which the frames were shrunk ([`SourceSpec::most_shrink`]).
     pub shrink: usize,
-    /// Number of frames to be read. A damaged video may have fewer; this is an error while reading.
+    /// Number of frames to be read. A damaged video may have fewer frames; reading then ends with an error.
     pub n_frames: u64,
     /// Number of frames read per second of the scene (the footage's rate divided by `step`), if known.
     pub frame_rate_hz: Option<f64>,
     /// Kind of footage.
     pub kind: SourceKind,
-    /// Turn in the tag of the first image or of the video, even if it is not applied; see [`Rotation`](crate::Rotation).
+    /// Rotation given by the tag of the first image or of the video, even if it is not applied; see [`Rotation`](crate::Rotation).
     pub tag: Turn,
     /// Number of bits that 16-bit images use, if it is less than 16. Their values are scaled accordingly.
     pub depth: Option<Depth>,
-    /// True if a video is interlaced: every picture has alternate lines from two different moments.
+    /// True if a video is interlaced: the lines of every picture alternate between two different moments.
     pub is_interlaced: bool,
 }
 
 /// One frame of footage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameView<'a> {
-    /// Index in the footage, counted from 0: `start + k * step`. Some `k` may be missing.
+    /// Index in the footage, counted from 0: `start + k * step`. Some frames may be missing.
     pub index: u64,
     /// Presentation time, in seconds after frame 0 of the footage; `None` if the rate is not known.
     pub time_s: Option<f64>,
@@ -76,11 +76,11 @@ pub struct FrameView<'a> {
 
 /// Open footage, read frame by frame in order.
 ///
-/// A frame of a video that cannot be decoded is left out. If frames are equally spaced, the index of the next frame shows the gap.
+/// A frame of a video that cannot be decoded is left out. If frames are equally spaced, the gap is visible in the index of the next frame.
 ///
-/// All frames have one size, and are 8-bit RGB regardless of the file's format. Grey is replicated, an alpha
-/// channel is dropped, and 16 bits are rounded to 8 (and scaled if the pictures use fewer than 16). Orientation tags (EXIF, or the
-/// display matrix of a phone's video) are applied according to [`SourceSpec::rotation`].
+/// All frames have one size, and are 8-bit RGB regardless of the file's format. Grey values are copied to all three channels, an alpha
+/// channel is dropped, and 16 bits are rounded to 8 (and scaled if the pictures use fewer than 16). Orientation tags (EXIF, or the display
+/// matrix of a phone's video) are applied according to [`SourceSpec::rotation`].
 ///
 /// ```no_run
 /// use footage::{Source, SourceSpec};
@@ -97,7 +97,7 @@ pub struct Source {
     info: SourceInfo,
     clock: Clock,
     reader: Reader,
-    /// True if the end was reached, or reading failed.
+    /// True if the end was reached or reading has failed.
     is_over: bool,
     buffer: Vec<u8>,
 }
@@ -195,7 +195,7 @@ impl Source {
         Ok(read.map(|(index, time_s)| FrameView { index, time_s, rgb }))
     }
 
-    /// Returns the error messages of a video's decoder so far; none for images.
+    /// Returns the error messages of a video's decoder so far; there are none for images.
     pub fn complaints(&self) -> Complaints {
         match &self.reader {
             Reader::Video(video) => video.complaints(),
@@ -205,7 +205,7 @@ impl Source {
 
     /// Skips the next `n` frames, and returns how many there were.
     ///
-    /// Images are not opened, and a frame without an image counts. The frames of a video have to be decoded.
+    /// Images are not opened, and frames without an image count as well. The frames of a video still have to be decoded.
     ///
     /// # Errors
     ///
@@ -233,7 +233,7 @@ impl Source {
         if self.is_over {
             return Ok(None);
         }
-        // There are no more frames after an error either.
+        // After an error, there are no more frames.
         self.is_over = true;
         let is_there = match &mut self.reader {
             Reader::Images(images) => self.clock.set(images.read_into(rgb)?),
@@ -277,7 +277,7 @@ impl Reader {
     }
 }
 
-/// Returns the size of the pictures of footage as they are stored, and the turn in the tag of the first picture. This is faster than
+/// Returns the size of the footage's pictures as they are stored, and the rotation in the tag of the first picture. This is faster than
 /// opening the footage.
 ///
 /// # Errors
@@ -297,7 +297,7 @@ pub fn stored(spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
 struct Clock {
     index: u64,
     step: u64,
-    /// Rate of the footage, before `step`.
+    /// Frame rate of the footage, before `step` is applied.
     rate_hz: Option<f64>,
     /// Times of the frames, if they are not equally spaced.
     times_s: Option<Vec<f64>>,
@@ -323,7 +323,7 @@ impl Clock {
         (self.index, listed.copied().or_else(by_rate))
     }
 
-    /// Sets the index to the index of the frame that was read, if a frame was read.
+    /// Sets the index to that of the frame that was read, if a frame was read.
     fn set(&mut self, index: Option<u64>) -> bool {
         self.index = index.unwrap_or(self.index);
         index.is_some()

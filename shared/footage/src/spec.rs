@@ -1,19 +1,19 @@
-//! The footage to open, and the choice of its frames.
+//! The footage to open, and which of its frames to read.
 
 use std::path::PathBuf;
 
 use crate::{FootageError, Rotation};
 
-/// Numbers in the names of pictures that are frames: `first`, `first + step`, ...
+/// Which numbers in the names of pictures belong to frames: `first`, `first + step`, ...
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PictureNumbers {
-    /// Number of frame 0.
+    /// Number in the name of frame 0.
     pub first: u64,
-    /// Difference of the numbers from frame to frame, at least 1.
+    /// Difference between the numbers of neighbouring frames, at least 1.
     pub step: u64,
 }
 
-/// Footage as specified by the user, and the choice of its frames.
+/// Footage as specified by the user, and which of its frames to read.
 ///
 /// Frames are counted from 0 in the order of the footage. The frames that are read are `start`,
 /// `start + step`, `start + 2 step`, ..., at most `count` of them.
@@ -26,14 +26,15 @@ pub struct SourceSpec {
     pub start: u64,
     /// Distance between frames, at least 1.
     pub step: u64,
-    /// Maximum number of frames to read, at least 1; all if not set. A still image is repeated this often (once if not set).
+    /// Maximum number of frames to read, at least 1; if not set, all frames. A still image is repeated this many times (read once if not
+    /// set).
     pub count: Option<u64>,
     /// Frames per second of footage that has no rate of its own: images, but not videos.
     pub frame_rate_hz: Option<f64>,
-    /// Numbers in the names of pictures that are frames, so that a missing picture is a missing frame. If not set, the frames are the
-    /// pictures in order, regardless of their names.
+    /// Which numbers in the names of pictures belong to frames; a number without a picture is then a missing frame. If not set, the
+    /// pictures are numbered in order, regardless of their names.
     pub numbers: Option<PictureNumbers>,
-    /// Method of turning the pictures.
+    /// How the pictures are rotated.
     pub rotation: Rotation,
     /// Maximum factor by which the pictures of a video may be shrunk when they are decoded.
     ///
@@ -66,7 +67,7 @@ impl SourceSpec {
         }
     }
 
-    /// Selects the same frames as [`Self::new`], with pictures turned as video players show them.
+    /// Selects the same frames as [`Self::new`], with pictures rotated as video players show them.
     pub fn upright(path: impl Into<String>) -> Self {
         Self {
             rotation: Rotation::Tag,
@@ -74,7 +75,7 @@ impl SourceSpec {
         }
     }
 
-    /// Refuses values that are invalid for any footage.
+    /// Returns an error for values that are invalid for any footage.
     pub(crate) fn check(&self) -> Result<(), FootageError> {
         if self.step == 0 {
             return Err(FootageError::ZeroStep);
@@ -94,7 +95,7 @@ impl SourceSpec {
     ///
     /// # Errors
     ///
-    /// Returns a [`FootageError`] if a value is invalid, or if the start is after the end.
+    /// Returns a [`FootageError`] if a value is invalid, or if the first frame is after the end of the footage.
     pub fn n_delivered(&self, n_frames: u64) -> Result<u64, FootageError> {
         self.check()?;
         if self.start >= n_frames {

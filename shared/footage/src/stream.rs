@@ -22,13 +22,13 @@ use crate::source::probe::{fraction, is_5_1};
 use crate::source::program::missing;
 use crate::{FootageError, Pieces, Size};
 
-/// Time without data after which a stream counts as gone, in seconds.
+/// Time without data, in seconds, after which a stream is assumed to have ended.
 const SILENCE_S: u64 = 5;
-/// Time that a stream may take to identify itself. It is longer than any time limit of the decoder.
+/// Maximum time until the size and rate of a stream are known. It is longer than any time limit of the decoder.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Minimum and maximum plausible rate in a header, in frames per second.
 const RATES_HZ: [f64; 2] = [1.0, 1000.0];
-/// Divisor of a picture's rows: the decoder reports the size of the top eighth of each picture, in grey.
+/// Divisor of a picture's rows: the decoder reports the number of bytes of the top eighth of each picture, in grey.
 pub(crate) const SHARE: usize = 8;
 /// Options that write the original packets, with every picture as a separate cluster, to the pipe on standard input.
 const AS_IT_CAME: [&str; 14] = [
@@ -70,7 +70,7 @@ pub struct StreamSpec {
     pub ffprobe: PathBuf,
     /// True if the original packets are needed in addition to the pictures.
     pub keeps: bool,
-    /// True if JPEG pictures over HTTP come without a boundary before the first one.
+    /// True if JPEG pictures over HTTP are sent without a boundary before the first one.
     pub is_bare: bool,
 }
 
@@ -78,21 +78,21 @@ pub struct StreamSpec {
 struct Asked {
     size: Size,
     rate_hz: Option<f64>,
-    /// True if the answer may be a single picture.
+    /// True if the camera's answer may be a single picture.
     may_be_picture: bool,
 }
 
 /// One frame of a stream.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StreamFrame {
-    /// Presentation time of the frame on the clock of the camera, in nanoseconds after an arbitrary moment; `None` if the stream has no
-    /// times of its own.
+    /// Presentation time of the frame on the clock of the camera, in nanoseconds after an arbitrary moment; `None` if the stream contains
+    /// no times.
     pub presented_nanos: Option<i64>,
-    /// Time at which the frame was taken by the clock of the camera, in nanoseconds since 1970 began. `None` if the camera does not report
-    /// it; RTSP cameras report it some seconds after they were opened.
+    /// Time at which the frame was taken, on the clock of the camera, in nanoseconds since 1970. `None` if the camera has not reported it;
+    /// RTSP cameras report it some seconds after they are opened.
     pub unix_nanos: Option<i64>,
-    /// Time of the frame in the decoder, in nanoseconds, even if the decoder invented it. It equals
-    /// [`Piece::nanos`](crate::Piece::nanos) to a millisecond.
+    /// Time of the frame in the decoder, in nanoseconds, even if the decoder has made it up. It is equal to
+    /// [`Piece::nanos`](crate::Piece::nanos) within a millisecond.
     pub label_nanos: i64,
 }
 
@@ -118,7 +118,7 @@ impl StreamEnd {
     /// Ends the decoder.
     pub fn end(&self) {
         let mut child = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        // Both calls fail only if the decoder has ended and was waited for.
+        // Both calls fail only if the decoder has ended and its exit status has been read.
         child.kill().ok();
         child.wait().ok();
     }
@@ -201,10 +201,10 @@ impl StreamSpec {
     ///
     /// # Errors
     ///
-    /// Returns [`FootageError::FfmpegMissing`]. An address that does not answer is reported only at the first frame.
+    /// Returns [`FootageError::FfmpegMissing`]. If the address does not answer, the error occurs only when the first frame is read.
     pub fn open(&self, size: Size) -> Result<LiveStream, FootageError> {
         let not_started = |source| missing(&self.ffmpeg, self.shown().as_ref(), source);
-        // A child process has three pipes. The third one is its standard input, to which it can write like to any other pipe.
+        // A child process has three pipes. The third one is its standard input, to which it can write as to any other pipe.
         let (kept, to_keep) = if self.keeps {
             let (reader, writer) = pipe().map_err(not_started)?;
             (Some(reader), Some(writer))
@@ -229,7 +229,7 @@ impl StreamSpec {
             .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            // Signals of the terminal end the run, and the run then ends the decoder.
+            // A signal from the terminal ends the run, which then ends the decoder.
             .process_group(0)
             .spawn()
             .map_err(not_started)?;
@@ -237,7 +237,7 @@ impl StreamSpec {
         let stdout = child.stdout.take().ok_or_else(no_pipe)?;
         let stderr = child.stderr.take().ok_or_else(no_pipe)?;
         let pieces = kept.map(Pieces::follow).transpose().map_err(not_started)?;
-        // The end of the decoder closes the pipe, once this process has closed its own writing end.
+        // The pipe is closed when the decoder ends, once this process has closed its own writing end.
         let clock = times.map(|(reader, _closed)| SenderClock::follow(reader));
         Ok(LiveStream {
             pieces,
@@ -257,7 +257,7 @@ impl StreamSpec {
         LiveAddress::Stream(self.address.clone()).to_string()
     }
 
-    /// Returns the error, without a password that the decoder repeats.
+    /// Returns the error for a message of the decoder, without the password that the message may repeat.
     fn failed(&self, message: &str) -> FootageError {
         failed(&self.shown(), &without_password_of(&self.address, message))
     }
@@ -275,7 +275,7 @@ impl StreamSpec {
         self.is("http") || self.is("https")
     }
 
-    /// Returns true if the frames have times of their own. The decoder invents the times of JPEG pictures over HTTP.
+    /// Returns true if the stream contains times of frames. For JPEG pictures over HTTP, the decoder makes up the times.
     fn has_times(&self) -> bool {
         !self.is_http()
     }
@@ -285,7 +285,7 @@ impl StreamSpec {
         let mut options = vec!["-fflags", "nobuffer", "-flags", "low_delay"];
         options.extend(["-analyzeduration", "1000000", "-probesize", "1000000"]);
         if !self.has_times() {
-            // A truncated JPEG picture is dropped, because its lower part would otherwise be grey.
+            // Drop truncated JPEG pictures, because their lower part would otherwise be grey.
             options.extend(["-err_detect", "explode"]);
         }
         if self.is_bare {
@@ -311,7 +311,7 @@ impl StreamSpec {
     }
 }
 
-/// Returns the options that write the time and size of each frame to standard error, and then its pixels as for files.
+/// Returns the options that write the time and size of each frame to standard error, and then its pixels to standard output as for files.
 ///
 /// * `version`: version of `ffmpeg`.
 pub(crate) fn outputs(version: &str) -> Vec<String> {
@@ -345,7 +345,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
     all.concat().into_iter().map(str::to_owned).collect()
 }
 
-/// Returns the message for a stream that ends without a message of its decoder.
+/// Returns the error message for a stream that ends without a message from its decoder.
 fn ended(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::UnexpectedEof => "the stream has ended".to_owned(),

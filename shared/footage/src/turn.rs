@@ -1,4 +1,4 @@
-//! Turns stored pixels so that a picture is upright.
+//! Rotates or mirrors stored pixels so that a picture is upright.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use image::{DynamicImage, RgbImage};
 
 use crate::Size;
 
-/// The turn that shows stored pixels upright, as given by the tag of an image (EXIF) or of a video (display matrix).
+/// The rotation or mirroring that shows stored pixels upright, as given by the tag of an image (EXIF) or of a video (display matrix).
 ///
 /// ```
 /// use footage::{Size, Turn};
@@ -20,20 +20,20 @@ use crate::Size;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Turn(pub(crate) Orientation);
 
-/// Method of turning the pictures of footage.
+/// How the pictures of footage are rotated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
-    /// Not turned: the pixels as they are stored. A calibration that was made of stored pixels refers to these pixels.
+    /// Pictures are not rotated: the pixels stay as they are stored. A calibration that was made with stored pixels refers to these pixels.
     #[default]
     Stored,
-    /// Turned according to the tag: pictures as video players show them.
+    /// Pictures are rotated according to the tag, as video players show them.
     Tag,
-    /// Turned by the given turn, regardless of the tag.
+    /// Pictures are rotated by this rotation, regardless of the tag.
     By(Turn),
 }
 
 impl Rotation {
-    /// Returns the turn that is applied to a picture with a tag.
+    /// Returns the rotation that is applied to a picture with a given tag.
     pub fn turn(self, tag: Turn) -> Turn {
         match self {
             Self::Stored => Turn::default(),
@@ -49,7 +49,7 @@ impl Default for Turn {
     }
 }
 
-/// The names in words, and the filters of `ffmpeg` that do the same.
+/// All rotations: their names in words, and the `ffmpeg` filters that do the same.
 const KNOWN: [(Orientation, &str, &str); 8] = [
     (Orientation::NoTransforms, "as stored", ""),
     (
@@ -86,7 +86,7 @@ const KNOWN: [(Orientation, &str, &str); 8] = [
 ];
 
 impl Turn {
-    /// Returns the clockwise turn by 0, 90, 180 or 270 degrees; `None` for any other angle.
+    /// Returns the clockwise rotation by 0, 90, 180 or 270 degrees; `None` for any other angle.
     pub fn clockwise(degrees: u32) -> Option<Self> {
         let turn = match degrees {
             0 => Orientation::NoTransforms,
@@ -98,7 +98,7 @@ impl Turn {
         Some(Self(turn))
     }
 
-    /// Returns the turn of a display matrix (ISO/IEC 14496-12, 8.2.2), to the nearest quarter.
+    /// Returns the rotation given by a display matrix (ISO/IEC 14496-12, 8.2.2), to the nearest 90 degrees.
     ///
     /// * `[a, b, c, d]`: a stored point `(x, y)` is shown at `(a x + c y, b x + d y)`.
     pub(crate) fn of_matrix([a, b, c, d]: [f64; 4]) -> Self {
@@ -116,7 +116,7 @@ impl Turn {
         })
     }
 
-    /// Returns true if the pixels are stored upright.
+    /// Returns true if the pixels are already stored upright.
     pub fn is_none(self) -> bool {
         self.0 == Orientation::NoTransforms
     }
@@ -141,7 +141,8 @@ impl Turn {
         }
     }
 
-    /// Returns the upright picture of stored pixels; unchanged if the number of bytes does not match the size.
+    /// Rotates stored pixels so that the picture is upright; if the number of bytes does not match the size, the picture is returned
+    /// unchanged.
     pub fn apply(self, size: Size, rgb: Vec<u8>) -> (Size, Vec<u8>) {
         if self.is_none() || rgb.len() != size.rgb_bytes() {
             return (size, rgb);
@@ -152,10 +153,10 @@ impl Turn {
         (self.size(size), image.into_rgb8().into_raw())
     }
 
-    /// Returns the filters of `ffmpeg` that turn an RGB picture; `None` if nothing has to be done.
+    /// Returns the `ffmpeg` filters that rotate an RGB picture; `None` if nothing has to be done.
     pub(crate) fn filters(self) -> Option<String> {
         let known = KNOWN.iter().find(|known| known.0 == self.0)?;
-        // The filters work in RGB, so that every pixel is a stored pixel in another place.
+        // The filters work in RGB, so that every pixel of the result is a stored pixel at another position.
         (!known.2.is_empty()).then(|| format!("format=rgb24,{}", known.2))
     }
 }
@@ -188,7 +189,7 @@ mod tests {
                 let [c, d] = [-b * sign, a * sign];
                 let turn = Turn::of_matrix([a, b, c, d]);
                 for (x, y) in [(0, 0), (2, 0), (1, 1)] {
-                    // Points count from the middle, so that no shift is needed.
+                    // Points are counted from the middle, so that no shift is needed.
                     let [u, v] = [x as f64 - 1.0, y as f64 - 0.5];
                     let due = [a * u + c * v, b * u + d * v];
                     let middle = if turn.swaps_sides() {

@@ -1,4 +1,4 @@
-//! Resizes, turns and crops an image by an affine map, into a given buffer.
+//! Resizes, rotates and crops an image by an affine map, into a given buffer.
 #![expect(
     clippy::inline_always,
     reason = "only inlined functions are compiled for the chosen instruction set"
@@ -48,7 +48,7 @@ pub enum WarpError {
     /// The map is singular or not finite, or its translation is too large.
     #[error("the map from output to source is singular or unbounded: {map:?}")]
     BadMap {
-        /// Map that was refused.
+        /// The rejected map.
         map: Affine,
     },
     /// The image would shrink too much.
@@ -65,14 +65,14 @@ pub enum WarpError {
 ///
 /// The value of an output pixel depends on the map:
 /// * With the identity, the pixel is copied.
-/// * With a map that keeps rows and columns and does not enlarge (resize, crop, mirror), the value is the area mean of
-///   the rectangle that the output pixel covers. It is exact up to rounding to a grey level (half up).
+/// * With a map that keeps rows and columns and does not enlarge (shrink, crop, mirror), the value is the area mean of the rectangle that
+///   the output pixel covers. It is exact up to rounding to a grey level (half up).
 /// * With any other map, the value is the mean of `n × m` bilinear samples. They are spread evenly over the output pixel and are at most
-///   one source pixel apart. For a turned image, the result equals turning it at full size (bilinear) and
-///   then averaging areas. Positions are rounded to 1/32 source pixel. From 4 source pixels
-///   per output pixel on, the rounding is coarser, but never coarser than 1/64 output pixel.
+///   one source pixel apart. For a rotated image, the result is the same as rotating it at full size (bilinear) and then averaging areas.
+///   Positions are rounded to 1/32 source pixel. From 4 source pixels per output pixel on, the rounding is coarser, but never coarser than
+///   1/64 output pixel.
 ///
-/// The result has the same bits on every machine: sums are of integers, or of `f32` in a fixed order.
+/// The result is bit-identical on every machine, because it only sums integers, or `f32` values in a fixed order.
 #[derive(Debug, Clone)]
 pub struct Warp {
     source: Size,
@@ -94,7 +94,7 @@ impl Warp {
     ///
     /// * `source_from_output`: map from pixels of the output to pixels of the source, both with the centre of the
     ///   top-left pixel at `(0, 0)`.
-    /// * `fill`: the value outside the source. It is interpolated with the pixels of the border.
+    /// * `fill`: the value outside the source. At the border, it is interpolated with the outermost pixels.
     ///
     /// # Errors
     ///
@@ -191,7 +191,7 @@ impl Body for Run<'_> {
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
-/// Returns the map that scales a source to an output, so that their outer borders coincide.
+/// Returns the map from an output to a source (resizing) for which their outer borders coincide.
 pub fn resize_map(source: Size, output: Size) -> Affine {
     let sx = source.width as f64 / output.width as f64;
     let sy = source.height as f64 / output.height as f64;

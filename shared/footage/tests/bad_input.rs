@@ -1,4 +1,4 @@
-//! Errors of invalid footage name the file, and nothing panics.
+//! Tests that errors for invalid footage name the file, and that nothing panics.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -327,7 +327,7 @@ fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
     assert!((30..60).contains(&whole.len()), "{} frames", whole.len());
     assert_eq!(whole.last().map(|whole| whole.0), Some(59));
     assert!(whole.is_sorted_by(|a, b| a.0 < b.0));
-    // The last group of pictures is not damaged, and every frame shows its own number.
+    // The last group of pictures is undamaged, and every frame in it shows its number.
     for (index, corner) in whole.iter().filter(|whole| whole.0 >= 50) {
         let picture = clip::frame(*index as usize).into_raw();
         let expected = &picture[picture.len() - 3..];

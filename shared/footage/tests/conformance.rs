@@ -1,4 +1,4 @@
-//! One clip, stored as every kind of footage, must give the same frames.
+//! Tests that one clip gives the same frames, whichever kind of footage it is stored as.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -37,7 +37,7 @@ fn check_all_frames(spec: &SourceSpec, expected: &[Vec<u8>]) {
     assert_eq!(source.info().n_frames, expected.len() as u64);
     let mut buffer = vec![99; clip::SIZE.rgb_bytes()];
     for (index, rgb) in expected.iter().enumerate() {
-        // Alternate between both methods to read.
+        // Alternate between both ways of reading.
         if index % 2 == 0 {
             assert_frame(source.next_frame().unwrap(), index, rgb);
         } else {
@@ -178,7 +178,7 @@ fn frames_of_an_irregular_video_keep_their_own_times() {
     }
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), 6);
-    // Frames 3, 4, 5 are a second late.
+    // Frames 3, 4 and 5 are delayed by a second.
     let late = "setpts=(N/25+gte(N\\,3))/TB";
     let options = ["-vf", late, "-fps_mode", "vfr", "-c:v", "png"];
     for name in ["irregular.mkv", "irregular.mov"] {

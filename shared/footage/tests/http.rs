@@ -1,4 +1,4 @@
-//! HTTP cameras with unusual behaviour.
+//! Tests with HTTP cameras that behave unusually.
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};

@@ -1,4 +1,4 @@
-//! A stream that is kept in its original form gives the same pictures when it is decoded later.
+//! Tests that a stream that is kept in its original form gives the same pictures when it is decoded later.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -16,7 +16,7 @@ const SIZE: Size = Size {
     height: 48,
 };
 
-/// Returns a stream of 80 pictures. Every fifth picture needs no other. A decoder reads most of the stream to identify it.
+/// Returns a stream of 80 pictures, every fifth of which can be decoded independently. A decoder reads most of the stream to identify it.
 fn stream() -> Vec<u8> {
     let made = Command::new("ffmpeg")
         .args([

@@ -1,4 +1,4 @@
-//! Tests of reading, warping and drawing: one binary, because linking takes longer than most tests.
+//! Tests of reading, warping and drawing. They are in one binary, because linking takes longer than most tests.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod clip;

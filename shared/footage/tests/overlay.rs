@@ -1,4 +1,4 @@
-//! The effect of drawing on pixels.
+//! Tests how drawing changes pixels.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -20,7 +20,7 @@ fn pixel(canvas: &Canvas, x: usize, y: usize) -> [u8; 3] {
     canvas.rgb()[at..at + 3].try_into().unwrap()
 }
 
-/// Returns the amount of colour on a black picture, in pixels of full colour.
+/// Returns the amount of colour on a black picture, as a number of fully coloured pixels.
 fn amount(canvas: &Canvas) -> f64 {
     let reds = canvas.rgb().iter().step_by(3);
     reds.map(|&red| f64::from(red)).sum::<f64>() / f64::from(INK[0])
@@ -210,7 +210,7 @@ fn coordinate() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// A coordinate to the right of the picture, so that the point is outside regardless of its other coordinate.
+/// Returns a coordinate to the right of the picture, so that the point is outside regardless of its other coordinate.
 fn outside() -> impl Strategy<Value = f64> {
     prop_oneof![
         80.0..1000.0,

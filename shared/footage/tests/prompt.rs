@@ -1,4 +1,4 @@
-//! A picture of a stream is available before the next one is sent.
+//! Tests that a picture of a stream is available before the next one is sent.
 
 use crate::clip;
 
@@ -16,7 +16,7 @@ const SIZE: Size = Size {
 };
 /// Number of pictures before the last one. A decoder reads some of them to identify the stream, and may lose the first picture.
 const N: usize = 40;
-/// Number of bytes of the picture after the last one, sent at one byte per second: far longer than the test takes.
+/// Number of bytes of the picture after the last one. They are sent at one byte per second, which takes far longer than the test.
 const N_BYTES: u64 = 120;
 
 /// Returns a picture of one colour as JPEG, as a part of a stream over HTTP.
@@ -54,7 +54,7 @@ fn the_last_picture_that_was_sent_is_there_though_no_other_follows() {
             client.write_all(&black).unwrap();
         }
         client.write_all(&white).unwrap();
-        // The next picture begins, byte by byte, so that the stream is not silent while the last picture is awaited.
+        // The next picture begins, byte by byte, so that the stream is not silent while the reader waits for the last picture.
         client.write_all(b"--next\r\nX-Wait: ").unwrap();
         for _ in 0..N_BYTES {
             if wait.recv_timeout(Duration::from_secs(1)).is_ok() || client.write_all(b"a").is_err()

@@ -1,4 +1,5 @@
-//! Properties that files state about themselves: turns, trims, rates, covers, numbers, depths, and a decoder's messages about them.
+//! Tests of properties that files state about themselves (rotations, trims, rates, covers, numbers, depths), and of a decoder's messages
+//! about them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -148,7 +149,7 @@ fn films_are_shrunk_by_what_divides_their_sides_to_the_means_of_their_pixels() {
             );
         }
     }
-    // A turned film is shrunk before it is turned.
+    // A rotated film is shrunk before it is rotated.
     let (info, _) = frames(&SourceSpec {
         most_shrink: 3,
         rotation: Rotation::By(Turn::clockwise(90).unwrap()),

@@ -24,7 +24,7 @@ fn warp(source: Size, rgb: &[u8], output: Size, map: &Affine, fill: Fill) -> Vec
     out
 }
 
-/// Returns the map that turns by `degrees` and shrinks by `scale`, about the centres of both images.
+/// Returns the map that rotates by `degrees` and shrinks by `scale`, about the centres of both images.
 fn turn(source: Size, output: Size, degrees: f64, scale: f64) -> Affine {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let centre = |value: usize| (value as f64 - 1.0) / 2.0;
@@ -102,7 +102,7 @@ fn halving_takes_the_mean_of_four_pixels_rounded_half_up() {
 fn a_quarter_turn_permutes_pixels() {
     let (source, output) = (Size::new(9, 14), Size::new(14, 9));
     let rgb = noise(source);
-    // Output (x, y) shows source (8 - y, x): turned counter-clockwise.
+    // Output (x, y) shows source (8 - y, x), so the picture is rotated counter-clockwise.
     let map = [[0.0, -1.0, 8.0], [1.0, 0.0, 0.0]];
     let out = warp(source, &rgb, output, &map, Fill::Black);
     assert_eq!(out, image(output, |x, y| at(&rgb, source, 8 - y, x)));
@@ -309,7 +309,7 @@ fn ramp_shows(degrees: f64, scale: f64, shift: [f64; 2]) -> Result<(), TestCaseE
         }
         let found = at(&out, output, x, y).map(f64::from);
         for (found, expect) in found.into_iter().zip([u, v, 255.0 - u]) {
-            // The tolerance is half a grey level, and half a phase (phases are 1/16 pixel above scale 4).
+            // The tolerance is half a grey level plus half a phase step (phases are 1/16 pixel above scale 4).
             prop_assert!(
                 (found - expect).abs() < 0.5 + 0.04,
                 "{found} for {expect} at {x}, {y}"

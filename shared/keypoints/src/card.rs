@@ -18,7 +18,7 @@ const MAX_KEYPOINTS: usize = 256;
 
 /// The card of a network that finds keypoints.
 ///
-/// Every key is checked, and unknown keys are refused.
+/// Every key is checked, and unknown keys are rejected.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Card {
@@ -36,14 +36,14 @@ pub struct Card {
     pub licence: String,
     /// Input of the network.
     pub input: Input,
-    /// Method that turns the box around a person into the input.
+    /// How the box around a person becomes the network's input.
     #[serde(default)]
     pub crop: Crop,
     /// Output of the network.
     pub output: Codec,
     /// Keypoints of the network.
     pub keypoints: KeypointNames,
-    /// Outputs in addition to the keypoints.
+    /// Outputs of the network in addition to the keypoints.
     #[serde(default, skip_serializing_if = "Also::is_empty")]
     pub also: Also,
 }
@@ -52,10 +52,11 @@ pub struct Card {
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Also {
-    /// Output with the direction in which the trunk faces, `[1, 2]`: towards the right of the picture, towards the camera. Twice
-    /// its scalar product with a direction of length 1 is the log-likelihood ratio of facing in this direction over facing away from it.
+    /// Output with the direction in which the trunk faces, `[1, 2]`: towards the right of the picture, towards the camera. For a direction
+    /// of length 1, twice the scalar product with this output is the log-likelihood ratio of facing in that direction over facing away from
+    /// it.
     pub front: Option<String>,
-    /// Output with the expected error of every keypoint, `[1, keypoints]`, in heights of the input.
+    /// Output with the expected error of every keypoint, `[1, keypoints]`, as a fraction of the height of the input.
     pub error: Option<String>,
 }
 
@@ -69,7 +70,7 @@ impl Also {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// Name of the input; if left out, the only input.
+    /// Name of the input; may be left out if there is only one input.
     pub name: Option<String>,
     /// Width, in pixels.
     pub width: usize,
@@ -102,7 +103,7 @@ pub enum Layout {
     /// One plane for each colour: `[1, 3, height, width]`.
     #[default]
     Planes,
-    /// The colours of a pixel next to each other: `[1, height, width, 3]`.
+    /// Interleaved channels: `[1, height, width, 3]`.
     Pixels,
 }
 
@@ -117,7 +118,7 @@ pub enum Colour {
     Bgr,
 }
 
-/// Type of the numbers that a network takes.
+/// Type of the numbers in a network's input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Numbers {
@@ -130,13 +131,13 @@ pub enum Numbers {
     I32,
 }
 
-/// Method that turns the box around a person into the input.
+/// How the box around a person becomes the network's input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Crop {
     /// Factor by which the box is enlarged about its middle.
     pub margin: f64,
-    /// Method that gives the box the shape of the input.
+    /// How the box is given the aspect ratio of the input.
     pub fit: Fit,
     /// Colour outside the picture, 0 to 255.
     pub fill: u8,
@@ -152,7 +153,7 @@ impl Default for Crop {
     }
 }
 
-/// Method that gives a box the shape of the input.
+/// How a box is given the aspect ratio of the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fit {
@@ -163,35 +164,37 @@ pub enum Fit {
     Stretch,
 }
 
-/// Output of a network, and the method of reading it.
+/// Output of a network, and how it is read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Codec {
     /// A map for every keypoint.
     HeatMap {
-        /// Name of the output; if left out, the only output.
+        /// Name of the output; may be left out if there is only one output.
         maps: Option<String>,
         /// Order of the output's axes: `[1, keypoints, rows, columns]`, or keypoints last.
         #[serde(default)]
         layout: Layout,
-        /// Number of maps after those of the keypoints, which are not read: the background, fields between joints.
+        /// Number of further maps after those of the keypoints, such as the background or fields between joints; they are not read.
         #[serde(default)]
         further: usize,
-        /// True if the corner cells are on the corner pixels, and these on the corners of the box (UDP: Huang et al. 2020; see
-        /// [`Window`](crate::Window)). Otherwise, a cell covers a whole number of pixels, starting from the corner of the input.
+        /// True if the corner cells of a map are at the corner pixels of the input, and the corner pixels are at the corners of the box
+        /// (UDP: Huang et al. 2020; see [`Window`](crate::Window)). Otherwise, each cell covers a whole number of pixels, starting from the
+        /// corner of the input.
         #[serde(default)]
         udp: bool,
-        /// True if each cell is in the middle of the pixels that it covers; otherwise, it is on the first of them. Not allowed with `udp`.
+        /// True if the position of each cell is the middle of the pixels that it covers; otherwise, it is the first of these pixels. Not
+        /// allowed with `udp`.
         #[serde(default)]
         centred: bool,
-        /// Method of refining a maximum.
+        /// How the position of a maximum is refined.
         #[serde(default)]
         refine: Refine,
         /// Meaning of a score.
         #[serde(default)]
         score: Score,
     },
-    /// A distribution over columns and one over rows for every keypoint.
+    /// For every keypoint, a distribution over columns and a distribution over rows.
     Simcc {
         /// Name of the output of columns.
         x: String,
@@ -199,13 +202,13 @@ pub enum Codec {
         y: String,
         /// Number of bins per pixel of the input.
         bins_per_pixel: f64,
-        /// Natural log-likelihood that one unit of the output stands for. It makes scores comparable.
+        /// Natural log-likelihood that corresponds to one unit of the output. It makes scores of different networks comparable.
         #[serde(default = "ten")]
         nats: f64,
     },
     /// Positions and scores.
     Keypoints {
-        /// Name of the output; if left out, the only output.
+        /// Name of the output; may be left out if there is only one output.
         list: Option<String>,
         /// Meaning of the numbers of a keypoint, in order.
         fields: Vec<ListField>,
@@ -218,7 +221,7 @@ pub enum Codec {
     },
 }
 
-/// One number of a listed keypoint.
+/// Meaning of one number of a listed keypoint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ListField {
@@ -239,7 +242,7 @@ pub enum ListUnit {
     /// Pixels of the input.
     #[default]
     Pixel,
-    /// Shares of the input's width and height.
+    /// Fractions of the input's width and height.
     Share,
 }
 
@@ -251,19 +254,19 @@ pub struct KeypointNames {
     pub set: Option<String>,
     /// Names of the keypoints in the order of the output, instead of a set.
     pub names: Option<Vec<String>>,
-    /// Meaning of left and right.
+    /// What left and right mean.
     #[serde(default)]
     pub sides: Sides,
 }
 
-/// Meaning of left and right.
+/// What left and right mean in the names of keypoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
-    /// Left and right are the sides of the body.
+    /// Left and right are the person's own sides.
     #[default]
     Anatomical,
-    /// Left and right are exchanged for people who are seen from behind.
+    /// Left and right are as they appear in the picture, so they are swapped for people who are seen from behind.
     Seen,
 }
 
@@ -279,10 +282,10 @@ fn ten() -> f64 {
     10.0
 }
 
-/// Reason why a text is not a card.
+/// Reason why a text was rejected as a card.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CardError {
-    /// The text is not TOML of this layout.
+    /// The text is not TOML with the expected keys.
     #[error(transparent)]
     Toml(#[from] toml::de::Error),
     /// The text has another format, or another version of it.
@@ -308,7 +311,7 @@ pub enum CardError {
 }
 
 impl Input {
-    /// Converts a colour of a picture (red first, 0 to 255) to the values and the order that the network takes.
+    /// Converts a colour of a picture (red first, 0 to 255) to the values and the colour order of the network's input.
     pub fn prepared(&self, colour: [f32; 3]) -> [f32; 3] {
         core::array::from_fn(|channel| {
             let source = match self.colour {

@@ -1,4 +1,4 @@
-//! Decoding of a network's output.
+//! Decodes a network's output.
 
 use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 
@@ -7,14 +7,14 @@ use crate::card::{Layout, ListField, ListUnit, Refine, Score};
 pub struct Keypoint {
     /// Column and row, in pixels of the network's input.
     pub at: [f64; 2],
-    /// Confidence of the network. It is from 0 to 1 if the network returns a share or log-odds, otherwise in the network's own unit.
+    /// Confidence of the network. It is from 0 to 1 if the network returns a probability or log-odds, otherwise in the network's own unit.
     pub score: f64,
 }
 
 /// Reason why an output cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OutputError {
-    /// The output has another shape.
+    /// The output does not have the expected shape.
     #[error("the output is {got:?}, expected {expected}")]
     Shape {
         /// Shape of the output.
@@ -48,7 +48,7 @@ impl<'a> HeatMaps<'a> {
     /// Interprets an output as maps.
     ///
     /// * `shape`: shape of the output, for one picture.
-    /// * `n`, `further`: number of keypoints of the card, and number of maps after theirs, which are not read.
+    /// * `n`, `further`: number of keypoints of the card, and number of further maps, which are not read.
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ impl<'a> HeatMaps<'a> {
     /// Returns the number of pixels of the input between two cells, across and down.
     ///
     /// * `input`: width and height of the network's input, in pixels.
-    /// * `udp`: true if corner cells are on corner pixels. Otherwise, each cell covers an equal share of the input.
+    /// * `udp`: true if the corner cells are at the corner pixels. Otherwise, each cell covers an equal part of the input.
     pub fn step(&self, input: [usize; 2], udp: bool) -> [f64; 2] {
         let cells = [self.columns, self.rows];
         [0, 1].map(|axis| {
@@ -130,8 +130,8 @@ impl<'a> HeatMaps<'a> {
     /// Returns the maximum of every map.
     ///
     /// * `input`: width and height of the network's input, in pixels.
-    /// * `udp`: true if corner cells are on corner pixels. Otherwise, the first cell is on the first pixel, and each cell covers an equal
-    ///   share of the input.
+    /// * `udp`: true if the corner cells are at the corner pixels. Otherwise, the first cell is at the first pixel, and each cell covers an
+    ///   equal part of the input.
     pub fn keypoints(
         &self,
         input: [usize; 2],
@@ -168,7 +168,7 @@ impl<'a> HeatMaps<'a> {
         best.0
     }
 
-    /// Returns the number of cells by which a maximum is moved along one axis; 0 at the edge.
+    /// Returns the number of cells by which refinement moves a maximum along one axis; 0 at the edge.
     fn refined(
         &self,
         keypoint: usize,
@@ -208,7 +208,7 @@ impl<'a> HeatMaps<'a> {
     }
 }
 
-/// Distributions over columns and over rows for every keypoint.
+/// For every keypoint, a distribution over columns and a distribution over rows.
 #[derive(Debug, Clone, Copy)]
 pub struct SimCc<'a> {
     axes: [&'a [f32]; 2],
@@ -345,7 +345,7 @@ pub(crate) fn finite(values: &[f32]) -> Result<(), OutputError> {
 mod tests {
     use super::*;
 
-    /// Returns a map of 12 by 16 cells with a bump at a point, and a flat map.
+    /// Returns a map of 12 by 16 cells with a peak at a point, and a flat map.
     fn bump([x, y]: [f64; 2], layout: Layout) -> Vec<f32> {
         let mut values = vec![0.0; 2 * 16 * 12];
         for row in 0..16 {
@@ -379,7 +379,7 @@ mod tests {
             assert_eq!(found(Refine::None).at, [20.0, 40.0]);
             assert_eq!(found(Refine::Quarter).at, [21.0, 39.0]);
             let [x, y] = found(Refine::Parabola).at;
-            // A parabola through logarithms is exact for a bump.
+            // A parabola through the logarithms is exact for a Gaussian peak.
             assert!(
                 (x - 21.2).abs() < 1e-4 && (y - 39.2).abs() < 1e-4,
                 "{x} {y}"

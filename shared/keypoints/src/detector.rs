@@ -11,8 +11,8 @@ mod centres;
 
 /// The card of a network that finds the boxes of people.
 ///
-/// The whole picture is resized to fit into the input, with its top-left corner in the top-left corner of the input. The rest is filled
-/// with a colour.
+/// The whole picture is resized to fit into the input, with its top-left corner in the top-left corner of the input. The rest of the input
+/// is filled with one colour.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DetectorCard {
@@ -38,19 +38,20 @@ pub struct DetectorCard {
     /// Minimum score of a box. Boxes with a lower score are dropped.
     #[serde(default = "least_score")]
     pub least_score: f64,
-    /// Maximum overlap of two boxes, as a share of their union. If two boxes overlap more, the one with the lower score is dropped.
+    /// Maximum overlap of two boxes, as a fraction of the area of their union. If two boxes overlap more, the one with the lower score is
+    /// dropped.
     #[serde(default = "most_overlap")]
     pub most_overlap: f64,
 }
 
-/// Output of a detector, and the method of reading it.
+/// Output of a detector, and how it is read.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "codec", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Boxes {
-    /// The grids of YOLOX (Ge et al. 2021), `[1, cells, 5 + classes]`: middle, size, objectness, and classes. Positions are
-    /// in cells relative to the cell, and sizes are logarithms in cells.
+    /// The grids of YOLOX (Ge et al. 2021), `[1, cells, 5 + classes]`: middle, size, objectness, and classes. Positions are relative to the
+    /// cell, in cells. Sizes are natural logarithms of the size in cells.
     Yolox {
-        /// Name of the output; if left out, the only output.
+        /// Name of the output; may be left out if there is only one output.
         grids: Option<String>,
         /// Number of pixels of the input per cell of each grid.
         #[serde(default = "strides")]
@@ -67,11 +68,11 @@ pub enum Boxes {
         /// Name of the output.
         boxes: String,
     },
-    /// A grid over the picture, `[1, 5, rows, columns]`. The values are the log-odds that the middle of a person's box is in a cell, and
-    /// the natural logarithms of the distances from the middle of the cell to the left, top, right and bottom of the
-    /// box, in cells. Every cell that is higher than its eight neighbours is a person (`parallax-lab train finder`).
+    /// A grid over the picture, `[1, 5, rows, columns]`. For each cell, the values are the log-odds that the middle of a person's box is in
+    /// the cell, and the natural logarithms of the distances (in cells) from the middle of the cell to the left, top, right and bottom of
+    /// the box. Every cell whose log-odds are higher than those of its eight neighbours is a person (`parallax-lab train finder`).
     Centres {
-        /// Name of the output; if left out, the only output.
+        /// Name of the output; may be left out if there is only one output.
         boxes: Option<String>,
         /// Number of pixels of the input per cell.
         stride: usize,
@@ -332,7 +333,7 @@ fn area([left, top, right, bottom]: &[f64; 4]) -> f64 {
     (right - left).max(0.0) * (bottom - top).max(0.0)
 }
 
-/// Returns the intersection of two boxes as a share of their union.
+/// Returns the area of the intersection of two boxes as a fraction of the area of their union.
 fn overlap(a: &[f64; 4], b: &[f64; 4]) -> f64 {
     let shared = area(&[
         a[0].max(b[0]),
@@ -435,7 +436,7 @@ output = { codec = "yolox", strides = [16, 32] }
     #[test]
     fn a_picture_that_is_enlarged_is_bilinear() {
         let card = DetectorCard::parse(YOLOX).unwrap();
-        // Two by one pixels become 64 by 32 pixels, so half of the input's width is between the two centres.
+        // Two by one pixels are enlarged to 64 by 32 pixels, so that the distance between their centres is half the input's width.
         let mut values = vec![f32::NAN; 3 * 64 * 32];
         let step = card.fill(&[0, 0, 0, 64, 64, 64], [2, 1], &mut values);
         assert_eq!(step, 1.0 / 32.0);

@@ -1,13 +1,13 @@
-//! Keypoints that other programs wrote into JSON files.
+//! Reads keypoints that other programs have written to JSON files.
 //!
 //! | layout | files | read by |
 //! |---|---|---|
-//! | OpenPose's | one for every frame | [`openpose::parse`] |
-//! | COCO's, a data set or a list of results | one for all frames | [`coco::parse`] |
-//! | mmpose's | one for every frame, or for all | either of the two |
+//! | OpenPose | one for every frame | [`openpose::parse`] |
+//! | COCO: a data set or a list of results | one for all frames | [`coco::parse`] |
+//! | mmpose | one for every frame, or one for all frames | either of these two functions |
 //!
-//! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). This module takes text and opens no file. It
-//! checks all content: numbers, lengths and counts have limits.
+//! Positions are pixels of the footage with the centre of the top-left pixel at (0, 0). This module takes text and opens no file. It checks
+//! all content: numbers, lengths and counts must be within limits.
 
 pub mod coco;
 pub mod openpose;

@@ -1,4 +1,4 @@
-//! The keypoints of a film that another program found: a folder with a file for every frame, or one file for all frames.
+//! The keypoints of a film that another program found, either as a folder with a file for every frame, or as one file for all frames.
 //!
 //! [`KeypointSource`] opens either of them and returns the people of a frame. [`crate::files`] parses the content of the files.
 

@@ -1,8 +1,8 @@
 //! Networks that find the keypoints of one person in a box: their cards, and the decoding of their outputs.
 //!
-//! A [`Card`] is a TOML file beside an ONNX file. It describes the network's input ([`Input`]), the method that turns the box around a
-//! person into this input ([`Crop`]), the output ([`Codec`]), and the names of the keypoints ([`KeypointNames`]). With a card, any network
-//! can be used: this crate has no code for particular networks.
+//! A [`Card`] is a TOML file beside an ONNX file. It describes the network's input ([`Input`]), how the box around a person becomes this
+//! input ([`Crop`]), the output ([`Codec`]), and the names of the keypoints ([`KeypointNames`]). With a card, any network can be used: this
+//! crate has no code for particular networks.
 //!
 //! | codec | output of the network | read by |
 //! |---|---|---|
@@ -13,7 +13,7 @@
 //! Coordinates of the network's input have pixel centres at integers, column first. [`Window`] maps them to the picture. [`files`]
 //! reads the results of other programs from their files.
 //!
-//! This crate runs no network.
+//! This crate does not run networks.
 #![forbid(unsafe_code)]
 
 mod card;

@@ -82,7 +82,7 @@ pub const BODY_25: [&str; 25] = [
     "right heel",
 ];
 
-/// Keypoints of OpenPose's experimental model: those of COCO, then those of MPII and of feet. Files do not distinguish them from
+/// Keypoints of OpenPose's experimental model: those of COCO, then those of MPII and of feet. In files, they cannot be distinguished from
 /// [`BODY_25`].
 pub const BODY_25B: [&str; 25] = [
     "nose",
@@ -154,7 +154,7 @@ pub const MPII_16: [&str; 16] = [
     "left wrist",
 ];
 
-/// Keypoints of Leeds Sports Pose, which are the 14 joints of the skeleton itself.
+/// Keypoints of Leeds Sports Pose; they are the 14 joints of the skeleton.
 pub const LSP_14: [&str; 14] = [
     "right ankle",
     "right knee",
@@ -183,7 +183,7 @@ pub const SETS: [(&str, &[&str]); 7] = [
     ("lsp-14", &LSP_14),
 ];
 
-/// First keypoints of COCO-WholeBody's 133: those of COCO and of the feet. Face and hands follow.
+/// The first of the 133 keypoints of COCO-WholeBody: those of COCO and of the feet. The face and the hands follow them.
 pub const COCO_FEET_23: [&str; 23] = [
     "nose",
     "left eye",
@@ -210,7 +210,8 @@ pub const COCO_FEET_23: [&str; 23] = [
     "right heel",
 ];
 
-/// Sets of files that have face and hands after the body: name, the keypoints that are read, and the number of keypoints of a person.
+/// Keypoint sets of files in which face and hands follow the body: name, the keypoints that are read, and the number of keypoints of a
+/// person.
 ///
 /// `coco-wholebody-133` is written by mmpose, `RTMLib` and `AlphaPose`, `halpe-136` by `AlphaPose`, and `body-135` by `OpenPose`.
 pub const WHOLE_BODIES: [(&str, &[&str], usize); 3] = [
@@ -219,24 +220,24 @@ pub const WHOLE_BODIES: [(&str, &[&str], usize); 3] = [
     ("body-135", &BODY_25B, 135),
 ];
 
-/// Distance from the neck to the top of the head, relative to the distance from the neck to the middle of eyes and ears.
+/// Distance from the neck to the top of the head, divided by the distance from the neck to the middle of eyes and ears.
 const HEAD_TOP: f64 = 1.6;
 
-/// A rule that computes a joint from keypoints.
+/// A rule by which a joint is computed from keypoints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Way {
     /// Numbers of the keypoints, and weights that sum to 1.
     pub row: Vec<(usize, f64)>,
-    /// Standard deviation along one axis that this rule adds to the standard deviation of its keypoints. It is a share of the height of the
+    /// Standard deviation along one axis that this rule adds to the standard deviation of its keypoints, as a fraction of the height of the
     /// person's box enlarged by a quarter.
     pub spread: f64,
 }
 
-/// Rules for the top of the head from a part of the face: keypoints, distance of the top from the neck relative to the distance of their
-/// middle from the neck, and spread.
+/// Rules that compute the top of the head from a part of the face. Each has the keypoints, the ratio of two distances from the neck (that
+/// of the top of the head, and that of the middle of the keypoints), and the spread.
 ///
-/// The factors of both ears and all spreads were measured on the keypoints of `body-25b`, which has the top of the head, in 421 people of
-/// the demonstration of Pose2Sim. The rules are in the order of their spreads.
+/// The ratio for both ears and all spreads were measured with the keypoints of `body-25b`, which include the top of the head, on 421 people
+/// in the demonstration of Pose2Sim. The rules are in the order of their spreads.
 const FACES: [(&[&str], f64, f64); 8] = [
     (
         &["left eye", "right eye", "left ear", "right ear"],
@@ -252,11 +253,12 @@ const FACES: [(&[&str], f64, f64); 8] = [
     (&["nose"], HEAD_TOP, 0.07),
 ];
 
-/// Returns the rules that compute every joint of `skeleton::PARSE14` from keypoints, best first. A joint that does not follow from
+/// Returns the rules that compute every joint of `skeleton::PARSE14` from keypoints, best first. A joint that cannot be computed from the
 /// keypoints has no rules.
 ///
-/// A keypoint with the joint's name is the joint. A neck is also the middle of the shoulders. The top of the head also follows from a part
-/// of the face: seen from the neck, it is beyond the middle of eyes and ears by 0.6 of the distance to that middle.
+/// A keypoint with the joint's name is used as the joint. The neck can also be computed as the middle of the shoulders. The top of the head
+/// can also be computed from a part of the face: it lies on the line from the neck through the middle of eyes and ears, at 1.6 times the
+/// distance to that middle.
 pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     let find = |name: &str| names.iter().position(|known| known == name);
     let mean = |wanted: &[&str]| -> Option<Vec<(usize, f64)>> {
@@ -289,8 +291,8 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     PARSE14.joints.iter().map(|joint| ways(joint.name)).collect()
 }
 
-/// Returns the best rule of every joint as a weighted sum of keypoints, if all of these keypoints exist. It is the first rule of
-/// [`joint_ways`]; `None` for a joint that does not follow from keypoints.
+/// Returns the best rule for every joint, the first of [`joint_ways`], as a weighted sum of keypoints; `None` for a joint that cannot be
+/// computed from the keypoints.
 pub fn joint_rows(names: &[String]) -> Vec<Option<Vec<(usize, f64)>>> {
     let ways = joint_ways(names).into_iter();
     ways.map(|ways| Some(ways.into_iter().next()?.row)).collect()

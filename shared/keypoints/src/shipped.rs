@@ -1,6 +1,6 @@
-//! The cards of published networks that ship with Parallax. The weights of these networks do not.
+//! The cards of published networks. They ship with Parallax; the weights of these networks do not.
 
-/// Cards of `configs/networks`: the name of the file without its ending, and the text.
+/// Cards in `configs/networks`: the name of the file without its extension, and its text.
 pub const SHIPPED: [(&str, &str); 9] = [
     (
         "rtmpose-coco17",
@@ -40,7 +40,7 @@ pub const SHIPPED: [(&str, &str); 9] = [
     ),
 ];
 
-/// Cards of `configs/detectors`, in the form of [`SHIPPED`].
+/// Cards in `configs/detectors`, in the same form as [`SHIPPED`].
 pub const SHIPPED_DETECTORS: [(&str, &str); 2] = [
     (
         "rtmdet-person",

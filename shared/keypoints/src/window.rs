@@ -1,4 +1,4 @@
-//! The window of a picture that a network sees.
+//! The window of a picture that becomes the input of a network.
 
 use crate::card::{Card, Codec, Fit, Layout};
 use crate::decode::Keypoint;
@@ -17,9 +17,9 @@ const MOST_SLENDER: f64 = 4.0;
 ///   first pixel, and its right edge to one pixel beyond the centre of the last (mmpose's plain recipe).
 /// * If the card has `udp = true`, `u = (x - c) (W - 1) / s + (W - 1) / 2`. Unbiased data processing (Huang et al. 2020) counts lengths in
 ///   steps between pixel centres, and `W` pixels have `W - 1` steps. The edges of the box map to the centres of the first and the last
-///   pixel, and its middle to the middle between them (mmpose's `TopdownAffine` with `use_udp`). The shape of the box is still that of the
-///   input, `W / H`, so the steps across and down differ a little. The corner cells of the maps are on the corner pixels
-///   ([`HeatMaps::step`](crate::HeatMaps::step)), and therefore on the edges of the box.
+///   pixel, and the middle of the box maps to the point midway between them (mmpose's `TopdownAffine` with `use_udp`). The aspect ratio of
+///   the box is still that of the input, `W / H`, so the steps across and down differ a little. The corner cells of the maps are at the
+///   corner pixels ([`HeatMaps::step`](crate::HeatMaps::step)), and therefore at the edges of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// Middle of the window in the picture, in pixels.
@@ -40,8 +40,8 @@ impl Window {
         Self::of_input(card, outline, [card.input.width, card.input.height])
     }
 
-    /// Returns the window around a person who is lying in the picture: as high as the input is wide, and as wide as it is high. The content
-    /// of the window is rotated by a quarter turn before it becomes the input.
+    /// Returns the window around a person who is lying in the picture: its height corresponds to the input's width, and its width to the
+    /// input's height. The content of the window is rotated by a quarter turn before it becomes the input.
     ///
     /// * `card`, `outline`: as for [`Self::new`].
     pub fn sideways(card: &Card, outline: [f64; 4]) -> Option<Self> {
@@ -79,7 +79,7 @@ impl Window {
     /// Returns the window around a person for use without a network. Its input is a grid of square cells over the box, none of which is
     /// smaller than a pixel. A box that is very slender, or a point, is widened.
     ///
-    /// Returns `None` for numbers that are not finite, and for a box whose sides are exchanged.
+    /// Returns `None` for numbers that are not finite, and for a box whose opposite sides are in the wrong order.
     ///
     /// * `outline`: the box: left, top, right, bottom, in pixels of the picture.
     /// * `margin`: factor by which the box is enlarged about its middle.
@@ -204,7 +204,7 @@ pub(crate) fn sample(rgb: &[u8], size: [usize; 2], [x, y]: [f64; 2], fill: f32) 
     })
 }
 
-/// Readable reference of [`sample`].
+/// The readable reference implementation of [`sample`].
 fn sample_anywhere(
     rgb: &[u8],
     [width, height]: [usize; 2],

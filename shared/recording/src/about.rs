@@ -1,4 +1,4 @@
-//! Metadata of a recording: its run, and the data that were left out on purpose.
+//! Metadata of a recording: the run that was recorded, and which data was left out on purpose.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ pub(crate) const TOPICS: &str = "parallax.topics";
 /// Version of the format that this crate writes. It reads no other version.
 const FORMAT: &str = "3";
 
-/// Data that were left out on purpose.
+/// Which data was left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Without {
     /// True if frames are recorded without pixels.
@@ -18,7 +18,7 @@ pub struct Without {
     pub evidence: bool,
 }
 
-/// The run of a recording.
+/// The run that was recorded.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
     /// Version of the program that wrote the recording.
@@ -29,7 +29,7 @@ pub struct About {
     pub began_unix_nanos: u64,
     /// Settings of the run, as JSON.
     pub settings: String,
-    /// Data that were left out on purpose.
+    /// Which data was left out on purpose.
     pub without: Without,
 }
 
@@ -47,7 +47,7 @@ pub enum AboutError {
         /// Value in the file.
         got: String,
     },
-    /// Another version of the program wrote the recording.
+    /// The recording was written by another version of the program.
     #[error("the recording has format {got:?}, but this program reads format {FORMAT}")]
     Format {
         /// Format in the file.

@@ -22,7 +22,7 @@ pub(crate) struct Chunk {
 }
 
 impl Chunk {
-    /// Reads the head of a chunk. Returns `None` if it is not that of an uncompressed chunk, or if its lengths contradict each other.
+    /// Reads the head of a chunk. Returns `None` if it is not the head of an uncompressed chunk, or if its lengths contradict each other.
     pub(crate) fn read(head: &[u8; HEAD_BYTES]) -> Option<Self> {
         let number = |at: usize| -> Option<u64> {
             Some(u64::from_le_bytes(*head.get(at..)?.first_chunk()?))

@@ -1,4 +1,4 @@
-//! Numbers of recorded and of lost messages of a topic.
+//! Number of recorded and of lost messages of each topic.
 
 use core::fmt;
 use core::str::FromStr;

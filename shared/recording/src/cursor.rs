@@ -1,8 +1,8 @@
-//! Sequential reading of a file of known length. Every length in the file is checked against it.
+//! Reads a file of known length sequentially. Every length in the file is checked against that length.
 
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-/// Reason why reading stops.
+/// Reason why reading has to stop.
 #[derive(Debug)]
 pub(crate) enum Stop {
     /// The file is truncated.

@@ -1,4 +1,4 @@
-//! A writer between the recording and its file. It counts the bytes of the file, and closes once a write has failed.
+//! A writer between the recording and its file, which counts the bytes of the file. After a write has failed, it accepts no more data.
 
 use std::io::{self, Write};
 use std::sync::Arc;
@@ -20,18 +20,18 @@ impl Keeper {
         self.0.n_bytes.load(Ordering::Relaxed)
     }
 
-    /// Returns true if nothing more is written.
+    /// Returns true if no more data is written.
     pub(crate) fn is_closed(&self) -> bool {
         self.0.is_closed.load(Ordering::Relaxed)
     }
 
-    /// Stops all further writes, because they would be at a wrong position.
+    /// Stops all further writes, because their data would be at wrong positions in the file.
     pub(crate) fn close(&self) {
         self.0.is_closed.store(true, Ordering::Relaxed);
     }
 }
 
-/// Passes bytes on until it is closed.
+/// Passes bytes on to the file until it is closed.
 pub(crate) struct Gate<W> {
     out: W,
     keeper: Keeper,

@@ -15,7 +15,7 @@ pub struct Entry {
     pub offset: u64,
     /// Length of the data, in bytes.
     pub len: u64,
-    /// Frame of the message; `None` for heartbeats, and if the topic was not known yet.
+    /// Frame of the message. `None` for heartbeats, and for messages whose topic was not known when they were scanned.
     pub frame: Option<u64>,
     /// Offset of the message's chunk, in bytes from the start of the file.
     pub chunk: u64,
@@ -43,7 +43,7 @@ pub struct Extent {
     pub damage: Vec<Damage>,
     /// Number of malformed messages, which were skipped.
     pub n_malformed: u64,
-    /// Number of messages that were written but not found, by topic. They leave gaps in the consecutive numbers.
+    /// Number of messages, by topic, that were written but not found. They are noticed as gaps in the message numbers.
     pub missing: BTreeMap<String, u64>,
 }
 
@@ -63,7 +63,7 @@ pub struct Recording {
     pub about: Result<About, AboutError>,
     /// Topics by name, except the topics that this program does not know.
     pub tracks: BTreeMap<String, Track>,
-    /// Numbers of recorded and of lost messages of every topic whose counts the file contains.
+    /// Numbers of recorded and of lost messages, for every topic for which the file contains counts.
     pub counts: BTreeMap<String, Count>,
     /// Part of the file that could be read.
     pub extent: Extent,
@@ -76,7 +76,7 @@ impl Recording {
         tracks.map(|track| track.entries.len() as u64).sum()
     }
 
-    /// Returns the number of messages that were sent but not recorded, over all topics whose counts the file contains.
+    /// Returns the number of messages that were sent but not recorded, over all topics for which the file contains counts.
     pub fn n_lost(&self) -> u64 {
         let lost = self.counts.values().map(|value| value.lost);
         lost.fold(0, u64::saturating_add)
@@ -100,8 +100,8 @@ impl Recording {
     }
 }
 
-/// Returns the messages of several topics in the order in which they were sent, each with the number of its
-/// topic. Messages sent at the same time are in the order of reception, then in the order of the file.
+/// Returns the messages of several topics in the order in which they were sent, each with the number of its topic. Messages that were sent
+/// at the same time are sorted by the time of reception, and after that by their order in the file.
 pub fn in_order(tracks: &[&Track]) -> Vec<(usize, Entry)> {
     let numbered = tracks.iter().enumerate();
     let mut all: Vec<(usize, Entry)> = numbered

@@ -65,7 +65,7 @@ impl Kind {
         })
     }
 
-    /// Returns true if a topic is of this kind in another version.
+    /// Returns true if a topic has this kind, but in another version.
     pub fn is_of_another_version(self, name: &str) -> bool {
         let base = |name: &str| name.split('/').next().map(str::to_owned);
         Self::of_topic(name).is_none() && base(&self.example()) == base(name)
@@ -86,8 +86,8 @@ impl Kind {
         }
     }
 
-    /// Returns the size of the message without its array, in bytes. For skeletons, whose list of people is written as an array, this is the
-    /// size of the fields before the count.
+    /// Returns the size of the message without its array, in bytes. The list of people in a skeletons message is written as an array; for
+    /// such a message, this is the size of the fields before the count of people.
     pub fn head_bytes(self) -> usize {
         match self {
             Self::Frame => size_of::<FrameHeader>(),
@@ -164,7 +164,7 @@ impl Kind {
         }
     }
 
-    /// Returns the message's schema, `ros2msg`: its definition and those of all types that it refers to.
+    /// Returns the message's schema in the format `ros2msg`: its definition, and the definitions of all types that it refers to.
     pub fn schema(self) -> String {
         let mut text = self.own_schema().to_owned();
         let rule = "=".repeat(80);
@@ -214,7 +214,7 @@ mod tests {
         let mut most = 1;
         for line in text.lines() {
             let [bytes, alignment] = size(line.split_whitespace().next().unwrap());
-            // The count of a list precedes it.
+            // The number of elements of a list is stored before the list.
             let begin = at + if line.contains("[] ") { 4 } else { 0 };
             assert_eq!(
                 begin % alignment,

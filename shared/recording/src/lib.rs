@@ -1,9 +1,8 @@
-//! A run as one MCAP file with every message of every topic. The file is readable even if it is truncated.
+//! Writes and reads a run as one MCAP file, with every message of every topic. The file is readable even if it is truncated.
 //!
-//! The file is standard MCAP: chunked, indexed, not compressed. Messages are little-endian CDR with ROS 2
-//! schemas (`msg/`), which other programs can read, because a `repr(C)` struct without padding has the layout of CDR.
-//! Every chunk has a checksum, which is compared when a message of the chunk is read. The metadata has a checksum, too.
-//! This crate does not use files, clocks or threads.
+//! The file is standard MCAP: chunked, indexed, not compressed. Messages are little-endian CDR with ROS 2 schemas (`msg/`), which other
+//! programs can read, because a `repr(C)` struct without padding has the layout of CDR. Every chunk has a checksum, which is checked when a
+//! message of the chunk is read. The metadata has a checksum, too. This crate does not use files, clocks or threads.
 #![forbid(unsafe_code)]
 
 mod kind;

@@ -137,7 +137,7 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// Times of the message.
     pub timing: Timing,
-    /// States whether the message contains a result, and if not, why.
+    /// Whether the message contains a result and, if not, why.
     pub status: Status,
 }
 
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// Returns the bytes of messages with this envelope, one of every kind that has an envelope.
+    /// Returns the bytes of messages with this envelope, one for every kind that has an envelope.
     fn heads(it: Envelope) -> Vec<(Kind, Vec<u8>)> {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
         let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());

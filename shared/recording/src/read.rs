@@ -18,7 +18,7 @@ pub enum ReadError {
     /// The file cannot be read.
     #[error("cannot read the recording")]
     Read(#[from] io::Error),
-    /// A chunk does not match its checksum, so none of its messages can be trusted.
+    /// A chunk does not match its checksum, so none of its messages is reliable.
     #[error("the chunk at byte {offset} does not match its checksum")]
     Checksum {
         /// Offset of the chunk in the file, in bytes.
@@ -35,7 +35,7 @@ pub enum ReadError {
     },
 }
 
-/// The chunks of one file that were read last. Messages of the same chunk are read and checked together.
+/// The most recently read chunks of a file. Messages of the same chunk are read and checked together.
 #[derive(Debug, Default)]
 pub struct Buffer {
     /// Chunks in order of use, the last used one first.
@@ -86,7 +86,7 @@ impl Loaded {
     }
 }
 
-/// Reads a message, compares the checksum of its chunk, and parses it.
+/// Reads a message, checks the checksum of its chunk, and parses it.
 ///
 /// * `buffer`: keeps the chunk for the next message.
 ///
@@ -113,7 +113,7 @@ pub fn read<'a, R: Read + Seek>(
     Message::parse(kind, data).map_err(|source| ReadError::Message { offset, source })
 }
 
-/// Reads the struct of a message into `buffer`, without its array, and therefore without comparing a checksum.
+/// Reads the struct of a message into `buffer`, without its array, and therefore without checking a checksum.
 ///
 /// # Errors
 ///
@@ -143,9 +143,9 @@ pub struct Damaged {
     pub chunk: u64,
 }
 
-/// Reads all messages of some topics, and returns those that [`read`] would refuse.
+/// Reads all messages of some topics, and returns those for which [`read`] would fail.
 ///
-/// * `wanted`: returns true if a topic has to be checked.
+/// * `wanted`: function that returns true if a topic has to be checked.
 ///
 /// # Errors
 ///

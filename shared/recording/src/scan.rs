@@ -1,8 +1,8 @@
 //! Scans a recording for the positions of all messages, up to the last complete chunk.
 //!
-//! The scan reads the file from its start, and skips the contents of messages. It needs no index at the end, so
-//! the file of a killed run is read like a complete file. After damage, it searches for the next chunk. By contrast, the reader of the
-//! crate `mcap` reads every byte, and stops at the first wrong one.
+//! The scan reads the file from its start, and skips the contents of messages. It needs no index at the end of the file, so the file of a
+//! killed run is read like a complete file. After a damaged position, it searches for the next chunk. By contrast, the reader of the crate
+//! `mcap` reads every byte, and stops at the first wrong byte.
 
 use std::io::{self, Read, Seek};
 
@@ -21,7 +21,7 @@ use crate::{ReadError, Recording, about};
 const WINDOW_BYTES: u64 = 1 << 16;
 /// Maximum length of a record that is not a message or a chunk, in bytes.
 const MAX_RECORD_BYTES: u64 = 16 << 20;
-/// Maximum number of false starts of records in a search.
+/// Maximum number of positions in a search that look like the start of a record but are not.
 const MOST_FALSE_STARTS: u32 = 10_000;
 /// Number of bytes of a metadata record before the text of its name.
 const NAME_AT: usize = RECORD_HEAD_BYTES as usize + 4;
@@ -30,8 +30,8 @@ const MOST_TOPICS: usize = 1024;
 
 /// Finds every message of a file.
 ///
-/// Regardless of the file's content, it needs memory only for existing messages, 56 bytes
-/// each. Contents of messages are not read: see [`read`](crate::read()) and [`check`](crate::check).
+/// Regardless of the file's content, it needs memory only for messages that exist, 56 bytes each. Contents of messages are not read: see
+/// [`read`](crate::read()) and [`check`](crate::check).
 ///
 /// # Errors
 ///
@@ -120,7 +120,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Some(())
     }
 
-    /// Finds the messages of a chunk. A chunk with contradictions is left out as a whole.
+    /// Finds the messages of a chunk. A chunk whose content contradicts itself is left out as a whole.
     fn chunk(&mut self, begin: u64) -> Result<(), Stop> {
         self.cursor.go(begin).map_err(Stop::Io)?;
         let head = self.cursor.array::<HEAD_BYTES>()?;
@@ -169,7 +169,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                     message.entry.chunk = begin;
                     message.entry.offset = self.cursor.at();
                     message.entry.len = len - MESSAGE_HEAD_BYTES;
-                    // The names of the topics may appear only at the end of the file, so it is decided there which messages have a frame.
+                    // The names of the topics may appear only at the end of the file; only then is it known which messages have a frame.
                     if message.entry.len >= FRAME_END as u64 {
                         let head = self.cursor.array::<FRAME_END>()?;
                         let frame = head.last_chunk().copied();
@@ -219,7 +219,7 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(())
     }
 
-    /// Moves to the next chunk or metadata. Returns false if there is none.
+    /// Moves to the next chunk or metadata record. Returns false if there are no more.
     fn go_to_next(&mut self, mut from: u64) -> io::Result<bool> {
         let overlap = HEAD_BYTES as u64 - 1;
         while from < self.cursor.end() {
@@ -251,14 +251,14 @@ impl<R: Read + Seek> Scan<'_, R> {
         Ok(false)
     }
 
-    /// Returns true if the head of a complete chunk begins here. Three of its lengths must agree.
+    /// Returns true if the head of a complete chunk begins here. To be accepted, three of its lengths must agree.
     fn is_chunk(&self, bytes: &[u8], begin: u64) -> bool {
         let chunk = bytes.first_chunk().and_then(Chunk::read);
         let head = begin + HEAD_BYTES as u64;
         chunk.is_some_and(|chunk| head + chunk.n_bytes <= self.cursor.end())
     }
 
-    /// Returns true if undamaged metadata begins here.
+    /// Returns true if an undamaged metadata record begins here.
     fn is_metadata(&mut self, begin: u64) -> io::Result<bool> {
         self.cursor.go(begin)?;
         let Some((_, len)) = or_io(self.cursor.record_head())? else {
@@ -278,7 +278,7 @@ impl<R: Read + Seek> Scan<'_, R> {
     }
 }
 
-/// Returns true if metadata that this program writes may begin here.
+/// Returns true if a metadata record as written by this program may begin here.
 fn is_ours(bytes: &[u8]) -> bool {
     let name = bytes.get(NAME_AT..);
     name.is_some_and(|name| name.starts_with(about::NAME.as_bytes()))

@@ -1,4 +1,4 @@
-//! Adds a checksum to metadata, because MCAP has checksums for chunks only.
+//! Adds a checksum to metadata, because MCAP has checksums only for chunks.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Writes a recording. The file is only appended to, so that later failures do not damage what has been written.
+//! Writes a recording. The file is only appended to, so that later failures do not damage the data already written.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -12,13 +12,14 @@ use crate::gate::{Gate, Keeper};
 use crate::seal::seal;
 use crate::{About, Count, Entry, Envelope, Kind, about, count, message};
 
-/// Size at which a chunk ends, in bytes. It ends with the message that exceeds this size, or earlier, with the last message of its frame.
+/// Size at which a chunk ends, in bytes. A chunk ends with the message that exceeds this size, or earlier, with the last message of a
+/// frame.
 const CHUNK_BYTES: u64 = 4 << 20;
 
 /// Reason why a recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The file cannot be written to. Its present content stays readable.
+    /// The file cannot be written to. Its existing content remains readable.
     #[error("cannot write the recording beyond {n_bytes} bytes")]
     Write {
         /// Size of the file, in bytes.
@@ -34,9 +35,9 @@ pub enum WriteError {
 
 /// Writes a recording.
 ///
-/// A chunk of the file ends when a message of a later frame arrives. One changed byte or a killed run costs one chunk, and a replay can do
-/// without one frame. A frame of more than 4 MiB has several chunks. The writer keeps in memory the current chunk, and an index entry of
-/// some hundred bytes for every chunk before it.
+/// A chunk of the file ends when a message of a later frame arrives. A changed byte or a killed run therefore loses at most one chunk, and
+/// a replay works without one frame. A frame of more than 4 MiB has several chunks. The writer keeps in memory the current chunk, and an
+/// index entry of some hundred bytes for every chunk before it.
 ///
 /// Every chunk has a checksum. The metadata of the run also has a checksum, and is in the file twice, at its beginning and at its end.
 pub struct Writer<W: Write> {
@@ -47,13 +48,13 @@ pub struct Writer<W: Write> {
     about: [(&'static str, BTreeMap<String, String>); 2],
     /// Latest frame of a message.
     latest: Option<u64>,
-    /// Numbers of lost messages that the file already states.
+    /// Numbers of lost messages that have already been written to the file.
     told: Vec<u64>,
 }
 
 struct Topic {
     name: String,
-    /// Kind of the messages; `None` for a topic for other programs.
+    /// Kind of the messages; `None` for a topic that is meant for other programs.
     kind: Option<Kind>,
     n_recorded: u64,
 }
@@ -71,7 +72,7 @@ struct Schema<'a> {
 pub struct Foreign {
     /// Name of the topic.
     pub topic: String,
-    /// Name of the schema, by which programs recognise content that they can show.
+    /// Name of the schema. Programs recognise by this name whether they can show the content.
     pub schema_name: &'static str,
     /// Text of the JSON schema.
     pub schema: &'static str,
@@ -97,7 +98,7 @@ impl<W: Write> Writer<W> {
         Self::begin_with(out, about, topics, &[])
     }
 
-    /// Begins a recording with additional topics for other programs, whose numbers follow.
+    /// Begins a recording with additional topics that are meant for other programs. They are numbered after the other topics.
     ///
     /// # Errors
     ///
@@ -217,7 +218,7 @@ impl<W: Write> Writer<W> {
         written.map_err(|error| failed(&self.keeper, error))
     }
 
-    /// Writes everything so far into the file, and the number of lost messages if it has increased.
+    /// Writes all data so far to the file, and the number of lost messages if it has increased.
     ///
     /// * `lost`: number of lost messages of every topic, in the order in which the topics were given.
     ///
@@ -265,7 +266,7 @@ impl<W: Write> Writer<W> {
         Ok(())
     }
 
-    /// Writes metadata, which ends the chunk.
+    /// Writes metadata, which also ends the current chunk.
     fn describe(&mut self, name: &str, map: BTreeMap<String, String>) -> Result<(), WriteError> {
         let metadata = Metadata {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Recordings as files: written, truncated, damaged, and read.
+//! Tests of recordings as files: they are written, truncated, damaged, and read.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::cell::RefCell;
@@ -36,7 +36,7 @@ fn kind(topic: usize) -> Kind {
     [Kind::Frame, Kind::ViewPose, Kind::Health][topic]
 }
 
-/// Returns the bytes of a message, whose frame is its time.
+/// Returns the bytes of a message; its frame number is its time.
 fn data((topic, time, elements): &Sent) -> Vec<u8> {
     let mut data = Vec::new();
     let head = [time.to_le_bytes(); 2].concat();
@@ -63,7 +63,7 @@ fn written(sent: &[Sent], flush_every: usize) -> Vec<u8> {
     file
 }
 
-/// Checks the messages of a file, in the order of the file, against the sent messages. Returns their number.
+/// Compares the messages of a file, in the order of the file, with the messages that were sent. Returns the number of messages found.
 fn held(recording: &Recording, file: &[u8], sent: &[Sent]) -> usize {
     let mut found = Vec::new();
     for (nth, name) in topics().iter().enumerate() {
@@ -185,7 +185,7 @@ fn an_unknown_topic_cannot_be_written() {
     assert!(matches!(refused, Err(WriteError::Topic(it)) if it == "frame/v9/0"));
 }
 
-/// A disk with limited room.
+/// A disk with limited space.
 #[derive(Clone)]
 struct Disk {
     file: Rc<RefCell<Vec<u8>>>,
@@ -310,8 +310,7 @@ fn given(file: &[u8]) -> Option<(Recording, Vec<Given>, usize)> {
     Some((recording, all, damaged.len()))
 }
 
-/// Checks that a changed file gives the same messages or reports damage, and gives no message that was not
-/// written.
+/// Checks that a changed file either gives the same messages or reports damage, and never gives a message that was not written.
 fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
     let (before, mut all, _) = given(whole).unwrap();
     let Some((after, some, n_damaged)) = given(changed) else {
@@ -380,7 +379,8 @@ fn one_changed_byte_loses_only_its_chunk_whose_messages_are_named() {
     assert!(other.unwrap().is_empty());
 }
 
-/// Returns the numbers of messages that a scan finds and misses, of positions that it calls damaged, and of unreadable messages.
+/// Returns four numbers: messages that a scan finds, messages that it misses, positions that it reports as damaged, and unreadable
+/// messages.
 fn judged(file: &[u8]) -> [u64; 4] {
     let recording = scan(&mut Cursor::new(file)).unwrap();
     let damaged = check(&mut Cursor::new(file), &recording, |_| true).unwrap();

@@ -1,4 +1,4 @@
-//! Topics for other programs in a recording: those programs read them, and this crate ignores them.
+//! Tests of topics that are meant for other programs: those programs read them, and this crate ignores them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::io::Cursor;

@@ -34,7 +34,7 @@ pub enum OverlayError {
 
 /// A picture to draw on. Points are `[x, y]` in pixels, with the centre of the top-left pixel at `(0, 0)`.
 ///
-/// Edges are anti-aliased: a pixel is blended in proportion to the share of it that the shape covers. Shapes are clipped to the
+/// Edges are anti-aliased: the colour of a pixel is blended in proportion to the area that the shape covers. Shapes are clipped to the
 /// picture. A shape with a coordinate that is not finite is not drawn.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Canvas {
@@ -51,7 +51,7 @@ impl Canvas {
         }
     }
 
-    /// Copies a part of a picture; returns `None` if the part is empty, or outside the picture.
+    /// Copies a part of a picture; returns `None` if the part is empty or outside the picture.
     ///
     /// * `size` and `rgb`: the picture.
     /// * `columns` and `rows`: the part.
@@ -68,7 +68,7 @@ impl Canvas {
 
     /// Returns the picture as a JPEG file; `None` if it is too large for the format.
     ///
-    /// * `quality`: percent.
+    /// * `quality`: JPEG quality, in percent.
     pub fn jpeg(&self, quality: u8) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
         let encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
@@ -123,7 +123,7 @@ impl Canvas {
         });
     }
 
-    /// Draws lines from point to point, for curves.
+    /// Draws lines from point to point; used for curves.
     pub fn polyline(&mut self, points: &[[f64; 2]], width: f64, colour: Colour) {
         for ends in points.windows(2) {
             self.line(ends[0], ends[1], width, colour);
@@ -174,7 +174,7 @@ impl Canvas {
         }
     }
 
-    /// Blends a colour into the pixels of a box `[x1, y1, x2, y2]`; `cover` returns the share of each pixel.
+    /// Blends a colour into the pixels of a box `[x1, y1, x2, y2]`; `cover` returns the fraction of each pixel that is covered.
     pub(super) fn paint(
         &mut self,
         corners: [f64; 4],

@@ -1,4 +1,4 @@
-//! Caches the answers of `ffprobe`. Each question is asked only once, even by several processes of a run.
+//! Caches the answers of `ffprobe`, so that each question is asked only once, even by several processes of a run.
 
 use core::time::Duration;
 use std::collections::BTreeMap;
@@ -13,8 +13,8 @@ use serde_json::{Value, json};
 use super::program::{input_name, input_options, missing};
 use crate::{FootageError, SourceSpec};
 
-/// Runs `ffprobe` on a stream of a file, but only once as long as the file does not change. Starting the program takes longer than its
-/// answer.
+/// Runs `ffprobe` on a stream of a file, but only once as long as the file does not change, because starting the program takes longer than
+/// the query itself.
 pub(super) fn run_ffprobe(
     path: &Path,
     spec: &SourceSpec,
@@ -66,8 +66,8 @@ impl Question {
     }
 }
 
-/// Returns all answers of `ffprobe` so far, for other processes ([`remember_answers`]). The result is a list of
-/// `[program, path, bytes, nanoseconds since 1970 of its last change, words, answer]`.
+/// Returns all answers of `ffprobe` so far, for other processes ([`remember_answers`]). The result is a list of `[program, path, size in
+/// bytes, time of the last change in nanoseconds since 1970, arguments, answer]`.
 pub fn answers_so_far() -> Value {
     let answers = ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
     let each = answers.iter().filter_map(|(question, answer)| {
@@ -87,8 +87,8 @@ pub fn answers_so_far() -> Value {
     each.collect()
 }
 
-/// Stores the answers that another process received from `ffprobe` ([`answers_so_far`]). Files that have not changed since then need
-/// no further run of `ffprobe`. A value that is not such a list is ignored.
+/// Stores the answers that another process received from `ffprobe` ([`answers_so_far`]). For files that have not changed since then,
+/// `ffprobe` is not run again. A value that is not such a list is ignored.
 pub fn remember_answers(told: &Value) {
     let mut answers = ANSWERS.lock().unwrap_or_else(PoisonError::into_inner);
     for it in told.as_array().into_iter().flatten().take(MOST_ANSWERS) {

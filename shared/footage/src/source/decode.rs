@@ -32,7 +32,7 @@ pub struct Depth {
 }
 
 impl Depth {
-    /// Returns the depth of images with this largest value; `None` if they use all 16 bits, or if all values are 0.
+    /// Returns the depth of images in which this is the largest value; `None` if they use all 16 bits, or if all values are 0.
     pub(super) fn of(brightest: u16) -> Option<Self> {
         let bits = [8, 10, 12, 14].into_iter().find(|i| brightest < 1 << i)?;
         (brightest > 0).then_some(Self { brightest, bits })
@@ -77,12 +77,13 @@ impl<'a> Encoded<'a> {
         Ok(size_of(&decoder))
     }
 
-    /// Returns the orientation tag (EXIF). A tag that cannot be read counts as none.
+    /// Returns the orientation tag (EXIF). A tag that cannot be read is treated as missing.
     pub(super) fn tag(&self) -> Turn {
         Turn(exif::orientation(&self.bytes).unwrap_or(Orientation::NoTransforms))
     }
 
-    /// Returns the size and the turned pixels, row major. Grey is replicated, alpha is dropped, and 16 bits are rounded to 8.
+    /// Returns the size and the rotated pixels, row major. Grey values are copied to all channels, alpha is dropped, and 16 bits are
+    /// rounded to 8.
     pub(super) fn decode(&self, reading: Reading) -> Result<(Size, Vec<u8>), FootageError> {
         let stored = self.size()?;
         let mut rgb = vec![0; stored.rgb_bytes()];
@@ -90,7 +91,7 @@ impl<'a> Encoded<'a> {
         Ok(reading.rotation.turn(self.tag()).apply(stored, rgb))
     }
 
-    /// Returns the size of the turned picture, from the header.
+    /// Returns the size of the rotated picture, from the header.
     pub(super) fn turned_size(&self, rotation: Rotation) -> Result<Size, FootageError> {
         Ok(rotation.turn(self.tag()).size(self.size()?))
     }
@@ -156,11 +157,11 @@ impl<'a> Encoded<'a> {
     }
 }
 
-/// Decodes a JPEG file with libjpeg, whose rounding the reference programs used. Returns `false` if it cannot be decoded.
+/// Decodes a JPEG file with libjpeg, which rounds in the same way as the reference programs. Returns `false` if it cannot be decoded.
 ///
-/// Other decoders differ by a few grey levels in every seventh sample. This is enough to break ties of
-/// gradient orientations differently: only 22 of 100 PARSE images then keep their detection to the cell.
-/// The library reports errors by unwinding. This function catches them, and the caller tries another decoder.
+/// Other decoders differ by a few grey levels in every seventh sample. This is enough to change how ties between gradient orientations are
+/// broken: with another decoder, the detection stays in exactly the same cell in only 22 of 100 PARSE images. The library reports errors by
+/// unwinding. This function catches them, and the caller tries another decoder.
 pub(crate) fn jpeg_into(bytes: &[u8], rgb: &mut [u8]) -> bool {
     let decode = || -> std::io::Result<Vec<u8>> {
         let mut lines = mozjpeg::Decompress::new_mem(bytes)?.rgb()?;
@@ -182,10 +183,10 @@ fn size_of(decoder: &impl ImageDecoder) -> Size {
     Size::new(width as usize, height as usize)
 }
 
-/// Returns true if the data of a JPEG file reach its end-of-image marker (ITU-T T.81, B.1.1).
+/// Returns true if the data of a JPEG file extends to its end-of-image marker (ITU-T T.81, B.1.1).
 ///
-/// Decoders fill missing data with grey without an error. The segments before the data are
-/// skipped, because a thumbnail in them has its own end marker.
+/// Decoders fill missing data with grey without an error. The segments before the data are skipped, because a thumbnail in them has an end
+/// marker of its own.
 pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
     const START_OF_SCAN: u8 = 0xda;
     let mut at = 2;
@@ -205,8 +206,8 @@ pub(crate) fn jpeg_is_whole(bytes: &[u8]) -> bool {
 
 /// Returns true if the file is a sequence of JPEG pictures of one size, as cameras write Motion JPEG without a container.
 ///
-/// Photographs may also be followed by other pictures (smaller ones, depth maps, gain maps). These are smaller, or a segment of the
-/// first picture names them (`MPF`, CIPA DC-007).
+/// In the files of photographs, other pictures may follow the first one (previews, depth maps, gain maps). These either are smaller, or are
+/// listed in a segment of the first picture (`MPF`, CIPA DC-007).
 pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
     let Some(first) = JpegHead::read(bytes) else {
         return false;
@@ -218,10 +219,10 @@ pub(super) fn is_jpeg_stream(bytes: &[u8]) -> bool {
     !first.has_others && second.is_some_and(|head| head.sides == first.sides)
 }
 
-/// Content of the segments of a JPEG picture before its data.
+/// Content of the segments before the data of a JPEG picture.
 struct JpegHead {
     sides: [u8; 4],
-    /// True if a segment names further pictures.
+    /// True if a segment lists further pictures.
     has_others: bool,
     /// Index at which the data begin.
     data: usize,

@@ -9,7 +9,7 @@ use crate::{FootageError, Size, SourceSpec};
 
 /// Number of bytes of a file that are searched for a second picture.
 const MAX_PICTURE: u64 = 64 << 20;
-/// Maximum number of images of a sequence that are read to find the number of used bits.
+/// Maximum number of images of a sequence that are read to find out how many bits are used.
 const N_BRIGHTEST: usize = 8;
 
 /// The images to read, in order.
@@ -19,7 +19,7 @@ pub(super) struct Images {
     files: std::vec::IntoIter<Numbered>,
     first: PathBuf,
     reading: Reading,
-    /// Size of all turned images.
+    /// Size of all images after rotation.
     pub(super) size: Size,
     /// Orientation tag of the first image.
     pub(super) tag: Turn,
@@ -94,8 +94,8 @@ impl Images {
     }
 }
 
-/// Returns the number of bits that the images use, estimated from some images of the whole sequence. Returns `None` if the images have
-/// 8 bits, or use all of 16.
+/// Returns the number of bits that the images use, estimated from some images of the whole sequence. Returns `None` if the images have 8
+/// bits, or if they use all 16 bits.
 fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
     let mut brightest = None;
     for it in files.iter().step_by(files.len().div_ceil(N_BRIGHTEST).max(1)) {
@@ -110,7 +110,7 @@ fn depth(files: &[Numbered]) -> Result<Option<Depth>, FootageError> {
     Ok(brightest.and_then(Depth::of))
 }
 
-/// Returns the size of an image as it is stored, and the turn in its tag.
+/// Returns the size of an image as it is stored, and the rotation in its tag.
 pub(super) fn stored(path: &Path) -> Result<(Size, Turn), FootageError> {
     let encoded = Encoded::read(path)?;
     Ok((encoded.size()?, encoded.tag()))
@@ -184,8 +184,8 @@ pub fn read_upright(path: &Path) -> Result<(Size, Vec<u8>, Turn), FootageError> 
     Ok((still.size, still.rgb, still.tag))
 }
 
-/// Returns true if the content of a file is one image. A sequence of JPEG pictures in one file is a video. An empty file counts as an
-/// image if it has the name of one.
+/// Returns true if the content of a file is one image. A sequence of JPEG pictures in one file is a video. An empty file counts as an image
+/// if its name is that of an image.
 ///
 /// # Errors
 ///

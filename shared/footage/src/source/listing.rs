@@ -19,7 +19,8 @@ pub(super) enum Listing {
     Images(Vec<PathBuf>),
 }
 
-/// Finds the files of `path`: a file or folder with this name if there is one, otherwise those of a numbered pattern or a glob.
+/// Finds the files of `path`: the file or folder of this name if there is one, otherwise the files that match it as a numbered pattern or a
+/// glob.
 pub(super) fn list(path: &str) -> Result<Listing, FootageError> {
     if path.is_empty() {
         return Err(FootageError::NoName);
@@ -82,7 +83,7 @@ fn absent(path: &str) -> FootageError {
     }
 }
 
-/// Returns the wanted files of a folder, in natural order of their names.
+/// Returns the files of a folder for which `wanted` returns true, in natural order of their names.
 fn files_of(folder: &Path, wanted: impl Fn(&OsStr) -> bool) -> Result<Vec<PathBuf>, FootageError> {
     let read = || -> std::io::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
@@ -159,7 +160,7 @@ impl<'a> Numbered<'a> {
         })
     }
 
-    /// Returns the files with any number in place of the pattern, in the order of their numbers. Gaps do not end the sequence.
+    /// Returns the files that have any number in place of the pattern, in the order of their numbers. Gaps do not end the sequence.
     fn files(&self) -> Result<Vec<PathBuf>, FootageError> {
         files_of(self.folder, |name| {
             name.to_str()

@@ -17,8 +17,8 @@ pub enum LiveAddress {
 }
 
 impl LiveAddress {
-    /// Parses `v4l2:/dev/video0`, a path under `/dev`, or the address of a stream (`rtsp`, `udp`, `http` and similar). Returns `None`
-    /// for any other text, which is footage.
+    /// Parses `v4l2:/dev/video0`, a path under `/dev`, or the address of a stream (`rtsp`, `udp`, `http` and similar). Returns `None` for
+    /// any other text, which is taken as the path of footage.
     ///
     /// ```
     /// use footage::LiveAddress;
@@ -45,7 +45,7 @@ impl LiveAddress {
 }
 
 impl fmt::Display for LiveAddress {
-    /// Writes the address without the name and the passwords that it may contain.
+    /// Writes the address without any user name or password in it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Device(path) => write!(f, "{}", path.display()),
@@ -60,12 +60,12 @@ pub fn is_live(text: &str) -> bool {
     LiveAddress::parse(text).is_some()
 }
 
-/// Returns true if a text is an address of any kind, even one that cannot be read. Such a text is not the path of a file.
+/// Returns true if a text is an address of any kind, even of a kind that cannot be read. Such a text is not the path of a file.
 pub fn is_address(text: &str) -> bool {
     what(text).is_some()
 }
 
-/// Returns the kind of source that the scheme of an address stands for, if it is not footage; `None` for a file.
+/// Returns what kind of source the scheme of an address stands for; `None` for a file.
 pub(super) fn what(text: &str) -> Option<&'static str> {
     match LiveAddress::parse(text) {
         Some(LiveAddress::Device(_)) => return Some("a live camera"),
@@ -93,7 +93,7 @@ pub(super) fn kind(file_type: FileType) -> &'static str {
     }
 }
 
-/// Returns the remedy for the message.
+/// Returns what to use instead, for the message.
 pub(super) fn instead(path: &str) -> String {
     if let Some(file) = path.strip_prefix("file://") {
         return format!("name the file without file://: {file}");

@@ -1,4 +1,4 @@
-//! The standard error of a decoder: error messages, and the time of every frame.
+//! The standard error output of a decoder: error messages, and the time of every frame.
 
 use std::io::Read;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Maximum number of bytes kept of a log, because a damaged video could fill a disk with its log.
+/// Maximum number of bytes of a log that are kept; otherwise, a damaged video could fill a disk with its log.
 const MAX_BYTES: usize = 16 << 10;
-/// Capacity of the queue of times. It must hold the times of the frames between two frames that are read, and the times of the frames by
-/// which the decoder is ahead.
+/// Capacity of the queue of times. It must have room for the times of all frames between two frames that are read, and for those of the
+/// frames by which the decoder is ahead.
 const MAX_TIMES: usize = 1 << 14;
-/// Time to wait for the time of a frame that has been read.
+/// Maximum time to wait for the time stamp of a frame whose pixels have been read.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Error messages of a decoder.
@@ -25,7 +25,7 @@ pub struct Complaints {
     pub last: String,
 }
 
-/// Beginnings or ends of `ffmpeg`'s messages about a picture that it leaves out, by version.
+/// How the messages begin or end, in different versions of `ffmpeg`, that report a picture left out.
 const UNDECODED: [&str; 4] = [
     "Error while decoding stream",
     "Error submitting packet",
@@ -33,7 +33,7 @@ const UNDECODED: [&str; 4] = [
     "Decoding error",
 ];
 
-/// Reads a log to its end on a separate thread, so that a decoder with much output does not block.
+/// Reads a log to its end on a separate thread, so that a decoder that writes many messages does not block.
 #[derive(Debug)]
 pub(crate) struct Log {
     reader: Option<JoinHandle<Vec<u8>>>,
@@ -71,7 +71,7 @@ impl Log {
         complaints.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Returns the time of the next frame, and waits for it for a short time.
+    /// Returns the time of the next frame, after waiting for a short time if necessary.
     pub(crate) fn next_time(&self) -> Option<FrameTime> {
         self.times.recv_timeout(PATIENCE).ok()
     }
@@ -86,7 +86,7 @@ impl Log {
 /// Separates the lines of ffmpeg's `framecrc` output from error messages.
 struct Lines {
     times: SyncSender<FrameTime>,
-    /// Unit of time from the log's header, in seconds.
+    /// Unit of time, in seconds, from the log's header.
     unit_s: f64,
     /// The error messages.
     kept: Vec<u8>,
@@ -155,8 +155,8 @@ impl Lines {
 /// Returns the time of a frame in a line such as `0,  0,  3,  1,  12, 0x14a00440`: stream, decoding time,
 /// presentation time, duration, bytes, checksum.
 ///
-/// The line is written in one step, but possibly in the middle of an error
-/// message, which is written in pieces. Any text before it is therefore ignored.
+/// The line is written in one step, but it may interrupt an error message, which is written in several steps. Any text before it is
+/// therefore ignored.
 fn frame_units(line: &str) -> Option<(f64, u64)> {
     let fields: Vec<&str> = line.split(',').map(str::trim).collect();
     let [.., stream, _, presented, _, bytes, checksum] = fields[..] else {
@@ -174,7 +174,7 @@ fn fraction(text: &str) -> Option<f64> {
     Some(above? / below?)
 }
 
-/// Joins the last three lines to one.
+/// Joins the last three lines into one.
 pub(crate) fn summary(log: &[u8]) -> String {
     let text = String::from_utf8_lossy(log);
     let lines: Vec<&str> = text
@@ -185,7 +185,7 @@ pub(crate) fn summary(log: &[u8]) -> String {
     lines[lines.len().saturating_sub(3)..].join("; ")
 }
 
-/// Removes the component of ffmpeg and its memory address, such as `[mov,mp4 @ 0x55d1]`, from a line.
+/// Removes the name of ffmpeg's component and its memory address, such as `[mov,mp4 @ 0x55d1]`, from a line.
 fn without_address(line: &str) -> &str {
     let Some((head, rest)) = line.split_once("] ") else {
         return line;

@@ -1,4 +1,4 @@
-//! The numbers in the names of pictures, and the frames that follow from the numbers of all cameras.
+//! The numbers in the names of pictures, and how frames are numbered by means of the numbers of all cameras.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -14,9 +14,9 @@ pub(super) struct Numbered {
     pub(super) frame: u64,
 }
 
-/// Returns the frames of pictures: by their numbers if these are given, otherwise in order.
+/// Returns the frame of each picture, by the numbers in the names if `numbers` is given, otherwise in order.
 ///
-/// Pictures before the first frame, and between two frames, are left out.
+/// Pictures whose numbers lie before the first frame or between two frames are left out.
 pub(super) fn frames(paths: Vec<PathBuf>, numbers: Option<PictureNumbers>) -> Vec<Numbered> {
     let told = numbers.and_then(|numbers| Some((numbers, numbers_of(&paths)?)));
     let Some((PictureNumbers { first, step }, numbers)) = told else {
@@ -60,8 +60,8 @@ fn numbers_of(paths: &[PathBuf]) -> Option<Vec<u64>> {
         let numbers: Vec<u64> = numbers.collect::<Option<_>>()?;
         numbers.is_sorted_by(|a, b| a < b).then_some(numbers)
     };
-    // Names may contain several ascending numbers, such as a number and a time. The numbers with the smallest gaps are used; in a tie, the
-    // last ones.
+    // Names may contain several numbers that ascend, such as a number and a time. The numbers with the smallest gaps are used; in a tie,
+    // those that come last in the names.
     let rising = (0..first.len()).rev().filter_map(column);
     rising.min_by_key(|numbers| numbers[numbers.len() - 1] - numbers[0])
 }
@@ -79,19 +79,19 @@ pub fn picture_numbers(path: &str) -> Result<Option<Vec<u64>>, FootageError> {
     })
 }
 
-/// Method of counting the pictures of several cameras.
+/// How the pictures of several cameras are numbered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Counting {
-    /// In order, because their numbers are too far apart to be numbers of frames.
+    /// In order, because the numbers in the names are too far apart to be frame numbers.
     InOrder,
-    /// By their numbers, which all cameras share.
+    /// By the numbers in the names, which mean the same frames for all cameras.
     Common(PictureNumbers),
-    /// By their numbers, starting from each camera's own first number, because their ranges have little in common.
+    /// By the numbers in the names, but starting from each camera's own first number, because the ranges of the cameras hardly overlap.
     Own(Vec<PictureNumbers>),
 }
 
 impl Counting {
-    /// Chooses the method for some cameras.
+    /// Chooses how the pictures of some cameras are numbered.
     ///
     /// * `cameras`: the numbers of every camera, ascending and not empty.
     pub fn of(cameras: &[Vec<u64>]) -> Self {
@@ -117,7 +117,7 @@ impl Counting {
     }
 }
 
-/// Returns the difference of the numbers from frame to frame; `None` if most frames would have no picture of any camera.
+/// Returns the difference between the numbers of neighbouring frames; `None` if most frames would have no picture from any camera.
 ///
 /// * `firsts`: the number of frame 0 of every camera.
 fn step_of(firsts: &[u64], cameras: &[Vec<u64>]) -> Option<u64> {

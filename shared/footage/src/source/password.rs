@@ -1,4 +1,4 @@
-//! Removes names and passwords from the addresses of cameras, so that they never appear in messages and files.
+//! Removes user names and passwords from the addresses of cameras, so that they never appear in messages and files.
 
 /// Text that replaces a password.
 const HIDDEN: &str = "***";
@@ -20,8 +20,8 @@ const SECRET_KEYS: [&str; 14] = [
     "loginpas",
 ];
 
-/// Removes secrets from the addresses in a text: the names and passwords before their hosts, and the values of keys such as
-/// `password` after their paths.
+/// Removes secrets from the addresses in a text: user names and passwords before the host, and the values of keys such as `password` after
+/// the path.
 ///
 /// ```
 /// let text = footage::without_passwords("no picture from rtsp://me:secret@10.0.0.5/a?pwd=1&x=2");
@@ -70,7 +70,7 @@ fn push_address(out: &mut String, address: &str) {
     }
 }
 
-/// Minimum length of a secret that is searched for, in characters. A shorter text may occur anywhere.
+/// Minimum length of a secret that is searched for, in characters; a shorter text may occur by chance.
 const SHORTEST: usize = 3;
 
 /// Removes the password of one address from a message, even if the message repeats only the password.

@@ -14,11 +14,11 @@ pub(super) struct Probe {
     pub(super) stream: u64,
     /// Size of the stored pictures.
     pub(super) stored: Size,
-    /// Turn in the display matrix.
+    /// Rotation given by the display matrix.
     pub(super) tag: Turn,
     /// Frames per second, if the file states them.
     pub(super) rate_hz: Option<f64>,
-    /// Frames per second according to the times of the decoder, even if the decoder invented these.
+    /// Frames per second according to the times of the decoder, even if the decoder has made them up.
     pub(super) clock_hz: Option<f64>,
     /// Number of frames in the stream, from the container or by counting packets.
     pub(super) n_frames: u64,
@@ -28,25 +28,25 @@ pub(super) struct Probe {
     pub(super) times_s: Option<Vec<f64>>,
     /// Time of the first frame in the decoder, in seconds; `None` if it is known only after the first frame has been decoded.
     pub(super) origin_s: Option<f64>,
-    /// True if pictures are coded from other pictures.
+    /// True if pictures can depend on other pictures.
     pub(super) is_inter: bool,
-    /// True if the video is interlaced: every picture has alternate lines from two different moments.
+    /// True if the video is interlaced: the lines of every picture alternate between two different moments.
     pub(super) is_interlaced: bool,
-    /// True if the option that keeps every frame is called `-fps_mode` (since 5.1), false if it is `-vsync`.
+    /// True if the `ffmpeg` option that keeps every frame is called `-fps_mode` (since version 5.1), false if it is called `-vsync`.
     pub(super) has_fps_mode: bool,
 }
 
 const ENTRIES: &str = "program_version=version:\
     stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order:\
     stream_disposition=attached_pic,timed_thumbnails,still_image:stream_side_data:format=format_name,duration,start_time";
-/// An unusual rate, to test whether ffprobe repeats it for a stream without a container.
+/// An unusual frame rate. It is passed to ffprobe to see whether ffprobe only repeats it, for a stream without a container.
 const ODD_RATE: &str = "225/32";
-/// Codecs whose pictures do not depend on other pictures. The first four are also used for cover pictures.
+/// Codecs whose pictures can be decoded independently of each other. The first four are also used for cover pictures.
 const INTRA: [&str; 9] = [
     "mjpeg", "png", "bmp", "gif", "rawvideo", "ffv1", "huffyuv", "prores", "dnxhd",
 ];
 
-/// Probes the film of `path`.
+/// Probes the video stream of `path`.
 ///
 /// Reads the whole file (without decoding) only in two cases: the container does not state the number of shown frames, or the frames
 /// may not be equally spaced.
@@ -58,7 +58,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
     let is_bare = number(&output["format"]["duration"]).is_none() && !has_clock(stream);
     let mut is_made_up = false;
     if is_bare {
-        // A stream without a container may state its rate. Otherwise, ffprobe invents 25 Hz.
+        // A stream without a container may state its frame rate. If it does not, ffprobe assumes 25 Hz.
         let again = ["-framerate", ODD_RATE, "-show_entries", ENTRIES];
         let told = run_ffprobe(path, spec, "v", &again)?;
         is_made_up =
@@ -104,7 +104,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
     Ok(probe)
 }
 
-/// Returns the size of the pictures of a video as they are stored, and the turn in its display matrix.
+/// Returns the size of a video's pictures as they are stored, and the rotation given by its display matrix.
 pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), FootageError> {
     let wanted = ["-show_program_version", "-show_entries", ENTRIES];
     let output = run_ffprobe(path, spec, "v", &wanted)?;
@@ -113,8 +113,8 @@ pub(super) fn stored(path: &Path, spec: &SourceSpec) -> Result<(Size, Turn), Foo
     Ok((Size::new(side("width"), side("height")), tag(stream)))
 }
 
-/// Returns the stream of a file that is the film, and not a cover picture, thumbnails or a single picture. If there are several, returns
-/// the largest one.
+/// Returns the video stream of a file that is neither a cover picture, nor thumbnails, nor a single picture. If there are several such
+/// streams, returns the largest one.
 fn film(output: &Value) -> &Value {
     let streams = output["streams"].as_array().map_or(&[][..], Vec::as_slice);
     let rank = |stream: &Value| {
@@ -126,12 +126,12 @@ fn film(output: &Value) -> &Value {
         let sides = ["width", "height"].map(|name| stream[name].as_u64().unwrap_or(0));
         (!is_marked, !is_single, !is_of_covers, sides[0] * sides[1])
     };
-    // The reversed order selects the first of equal streams.
+    // The order is reversed because the first of equal streams should be selected.
     let best = streams.iter().rev().max_by_key(|stream| rank(stream));
     best.unwrap_or(&Value::Null)
 }
 
-/// Returns the turn in the display matrix of a stream.
+/// Returns the rotation given by the display matrix of a stream.
 fn tag(stream: &Value) -> Turn {
     let data = stream["side_data_list"].as_array().map_or(&[][..], Vec::as_slice);
     let text = data.iter().find_map(|value| value["displaymatrix"].as_str());
@@ -148,7 +148,7 @@ fn tag(stream: &Value) -> Turn {
 
 /// Returns the time at which the decoder shows the first frame, in seconds.
 ///
-/// If frames are not decoded in their order, some containers have only the times of decoding, which the decoder shifts.
+/// If the decoding order differs from the display order, some containers store only decoding times, which the decoder shifts.
 fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
     let has_order = INTRA.contains(&codec) || stream["has_b_frames"] == 0;
     let starts = [stream, format].map(|value| number(&value["start_time"]));
@@ -160,7 +160,7 @@ fn origin(stream: &Value, format: &Value, codec: &str) -> Option<f64> {
 }
 
 impl Probe {
-    /// Returns true if fewer frames are shown than are stored, according to the shown duration. MP4 and related formats have edit lists.
+    /// Returns true if some stored frames are not shown, according to the shown duration. MP4 and related formats have edit lists for this.
     fn is_trimmed(&self, stream: &Value, format: &Value) -> bool {
         let names = format["format_name"].as_str().unwrap_or_default();
         let has_edits = names.split(',').any(|part| part == "mov" || part == "mp4");
@@ -196,7 +196,7 @@ impl Probe {
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 
-    /// Returns the rate that converts times of the decoder to frames, if the frames are equally spaced.
+    /// Returns the frame rate by which times of the decoder are converted to frame numbers, if the frames are equally spaced.
     pub(super) fn regular_hz(&self) -> Option<f64> {
         self.clock_hz.filter(|_| self.times_s.is_none())
     }
@@ -207,7 +207,7 @@ impl Probe {
         (times.len() as u64 == self.n_frames).then_some(times)
     }
 
-    /// Returns the frame at a time of the decoder; `None` if times do not identify frames.
+    /// Returns the number of the frame at a time of the decoder; `None` if frames cannot be identified by their times.
     pub(super) fn frame_at(&self, time_s: f64) -> Option<u64> {
         if let Some(rate_hz) = self.regular_hz() {
             return Some((time_s * rate_hz).round() as u64);
@@ -270,7 +270,7 @@ pub(crate) fn fraction(value: &Value) -> Option<f64> {
 
 /// Returns true if `ffmpeg` is of version 5.1 or later, which has `-fps_mode` and writes the times of sender reports.
 ///
-/// * `version`: for example `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`. Builds without a number are assumed to be recent.
+/// * `version`: for example `5.1.9-0+deb12u1`, `n7.0`, `4.4.2-0ubuntu0.22.04.1`. Builds without a version number are assumed to be recent.
 pub(crate) fn is_5_1(version: &str) -> bool {
     let mut numbers = version
         .trim_start_matches('n')

@@ -1,4 +1,4 @@
-//! Names of files for ffmpeg and ffprobe.
+//! Names of files as arguments of ffmpeg and ffprobe.
 
 use std::io;
 use std::path::Path;
@@ -16,7 +16,7 @@ pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {
     &[]
 }
 
-/// Returns the name of a file for ffmpeg, protected against names such as `concat:x` and `-x`.
+/// Returns the name of a file as an argument of ffmpeg, protected against misinterpretation of names such as `concat:x` and `-x`.
 pub(crate) fn input_name(path: &Path) -> std::ffi::OsString {
     let mut name = std::ffi::OsString::from("file:");
     name.push(path);

@@ -43,7 +43,7 @@ pub fn read_sound(spec: &SourceSpec, rate_hz: u32) -> Result<Option<RecordedSoun
     let start_s = |value: &Value| number(&value["start_time"]).unwrap_or(0.0);
     let first_frame_s = start_s(&of_pictures["streams"][0]);
     Ok(Some(RecordedSound {
-        // The decoder inserts silence before a sound that begins later than the file.
+        // The decoder inserts silence if the sound begins later than the file.
         begins_s: start_s(&of_pictures["format"]) - first_frame_s,
         samples: samples(&path, spec, rate_hz)?,
     }))

@@ -15,7 +15,7 @@ use crate::{FootageError, Size, SourceSpec};
 pub(super) struct Video {
     path: PathBuf,
     pub(super) probe: Probe,
-    /// Size of the turned and shrunk pictures.
+    /// Size of the pictures after rotation and shrinking.
     pub(super) size: Size,
     /// Factor by which the pictures are shrunk.
     pub(super) shrink: usize,
@@ -29,11 +29,12 @@ pub(super) struct Video {
     n_given: u64,
     /// Index in the footage of the last frame that was read.
     last_index: u64,
-    /// Last frame whose time the decoder reported.
+    /// Last frame for which the decoder has reported a time.
     last_told: Option<u64>,
-    /// Number of pictures that the decoder had left out at the last gap.
+    /// Number of pictures that the decoder had left out when the last gap was found.
     n_undecoded: u64,
-    /// Frames that do not depend on others. Set while the frames that are read depend on one that could not be decoded.
+    /// Key frames, which can be decoded independently of others. Set while the frames that are read depend on a frame that could not be
+    /// decoded.
     is_broken: Option<Vec<u64>>,
     child: Child,
     stdout: ChildStdout,
@@ -47,7 +48,7 @@ impl Video {
         let n_promised = spec.n_delivered(probe.n_promised)?;
         let not_started = |source| missing(&spec.ffmpeg, path, source);
         let mut child = Command::new(&spec.ffmpeg)
-            // An incomplete picture is left out, because the decoder would otherwise invent the rest of it.
+            // Incomplete pictures are left out, because the decoder would otherwise make up the missing parts.
             .args(["-nostdin", "-v", "error", "-noautorotate"])
             .args(["-err_detect:v", "explode"])
             .args(input_options(path))
@@ -100,7 +101,7 @@ impl Video {
         Ok(None)
     }
 
-    /// Finds the index of the frame whose pixels have just been read. Returns true if the frame is complete.
+    /// Finds the index of the frame whose pixels have just been read. Returns true if the frame was decoded completely.
     fn identify(&mut self) -> Result<bool, FootageError> {
         let due = match self.n_read {
             0 => self.spec.start,
@@ -111,7 +112,7 @@ impl Video {
             return Ok(true);
         }
         loop {
-            // The decoder reports times of all frames, but pixels only of the chosen ones.
+            // The decoder reports the times of all frames, but the pixels only of the selected frames.
             let time_s = self.log.next_time().map(|next_time| next_time.time_s);
             let Some(told) = time_s.and_then(|time_s| self.probe.frame_at(time_s)) else {
                 self.last_index = due;
@@ -190,10 +191,9 @@ impl Video {
 
     /// Distinguishes the end of a complete video from the end of a video that is cut off.
     ///
-    /// A video counts as damaged if the decoder reports errors *and* frames are missing. Many valid videos cause
-    /// messages, and some containers count a frame or two that are never shown. Without a message, a tenth of
-    /// the frames may be missing. The duration in the header is used only if there is a message, because the
-    /// sound may be longer than the pictures.
+    /// A video counts as damaged if the decoder reports errors *and* frames are missing. Many valid videos cause messages, and some
+    /// containers count a frame or two that are never shown. Without an error message, up to a tenth of the frames may be missing. The
+    /// duration in the header is used only if there is an error message, because the sound may be longer than the pictures.
     fn check_end(&mut self, is_partial: bool) -> Result<(), FootageError> {
         let message = self.log.finish();
         let status = self.child.wait().map_err(|source| FootageError::Io {
@@ -212,7 +212,7 @@ impl Video {
             });
         }
         let n_expected = self.n_promised;
-        // If some frames could not be decoded, the end may still be complete.
+        // Even if some frames could not be decoded, the end of the video may be complete.
         let start = self.spec.start;
         let n_reached = (self.last_index.max(start) - start) / self.spec.step + 1;
         let has_errors = !message.is_empty() && n_reached < n_expected;
@@ -235,13 +235,13 @@ impl Video {
 
 impl Drop for Video {
     fn drop(&mut self) {
-        // Both calls fail only if the decoder has already been waited for.
+        // Both calls fail only if the decoder's exit status has already been read.
         self.child.kill().ok();
         self.child.wait().ok();
     }
 }
 
-/// Returns the size of the turned pictures.
+/// Returns the size of the pictures after rotation.
 fn turned_size(probe: &Probe, spec: &SourceSpec) -> Size {
     spec.rotation.turn(probe.tag).size(probe.stored)
 }
@@ -261,19 +261,19 @@ fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
     (by > 1).then_some(filter)
 }
 
-/// Returns true if the decoder reports the times of frames.
+/// Returns true if the decoder can report the times of frames.
 fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
 }
 
 /// Returns the options for the outputs of the decoder.
 ///
-/// If times identify frames, the times of all frames are written to standard error. The pixels of the chosen frames are written to
-/// standard output. A frame that cannot be decoded is missing in both outputs.
+/// If frames can be identified by their times, the times of all frames are written to standard error. The pixels of the selected frames are
+/// written to standard output. A frame that cannot be decoded is missing from both outputs.
 ///
-/// Times come first. If two frames are decoded at once, the decoder writes everything that belongs to its first output, then
-/// everything that belongs to its second. A reader that has the pixels of a frame must therefore wait for its time before it reads the
-/// next pixels.
+/// Times are the first output. If two frames are decoded at once, the decoder first writes everything that belongs to its first output, and
+/// then everything that belongs to its second. After reading the pixels of a frame, a reader must therefore wait for the frame's time
+/// before it reads the next pixels.
 fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let mut arguments = Vec::new();
     if has_times(probe) {
@@ -286,7 +286,7 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
             "framecrc",
             "pipe:2",
         ];
-        // Times are written for all frames from the first to the last, so that a missing frame between the chosen ones is noticed.
+        // The times of all frames from the first to the last are written, so that a missing frame between the selected ones is noticed.
         let all = SourceSpec {
             step: 1,
             count: spec.count.map(|count| (count - 1).saturating_mul(spec.step).saturating_add(1)),
@@ -329,9 +329,9 @@ fn output(
 
 /// Returns the filter that drops unwanted frames before they are written to the pipe.
 ///
-/// All earlier frames are decoded nevertheless, because a seek finds the wrong frame in many files. If
-/// frames are equally spaced, they are chosen by their time, so that a frame that cannot be decoded does not
-/// shift the others. If their times are listed, the reader of the pipe chooses them.
+/// All earlier frames are decoded nevertheless, because a seek finds the wrong frame in many files. If frames are equally spaced, they are
+/// selected by their times, so that a frame that cannot be decoded does not shift the others. If their times are listed, the reader of the
+/// pipe selects them.
 fn frame_choice(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
     let (start, step) = (spec.start, spec.step);
     let is_part = start > 0 || step > 1;
@@ -422,7 +422,7 @@ mod tests {
         ));
     }
 
-    /// Creates a second of video, which is too large for the pipe. Without ffmpeg, prints a message and returns `None`.
+    /// Creates one second of video that does not fit into the pipe. Without ffmpeg, prints a message and returns `None`.
     #[cfg(target_os = "linux")]
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     fn long_video(folder: &Path) -> Option<PathBuf> {
@@ -462,7 +462,7 @@ mod tests {
             return;
         };
         let mut video = Video::open(&path, &SourceSpec::new("x")).unwrap();
-        // Closes the only reader of the pipe, as the death of this process would do.
+        // Closes the only reading end of the pipe, as the death of this process would do.
         let other = Command::new("true").stdout(Stdio::piped()).spawn();
         let (mut other, pipe) = (other.unwrap(), &mut video.stdout);
         drop(std::mem::replace(pipe, other.stdout.take().unwrap()));

@@ -3,14 +3,14 @@
 use super::Fill;
 use crate::Size;
 
-/// Source pixels that one output coordinate covers, and the covered share of each.
+/// The source pixels that one output coordinate covers, and the covered fraction of each.
 #[derive(Debug, Clone, PartialEq)]
 struct Cover {
     first: usize,
     weights: Vec<f32>,
 }
 
-/// Row and column covers. A pixel is the sum over both, divided by the area.
+/// The covers of rows and columns. A pixel is the weighted sum over both, divided by the area.
 #[derive(Debug, Clone)]
 pub(super) struct Area {
     columns: Vec<Cover>,

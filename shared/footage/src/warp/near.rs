@@ -1,7 +1,7 @@
-//! Bilinear samples in few steps, for maps that turn a picture without shrinking it.
+//! Computes bilinear samples in few steps, for maps that rotate a picture without shrinking it.
 //!
-//! [`Sampled`] is the readable reference, with the same bits but four times the computing time. It also computes the pixels at the
-//! border.
+//! [`Sampled`] is the readable reference, which gives bit-identical results but takes four times as long. It also computes the pixels at
+//! the border.
 
 use std::ops::Range;
 
@@ -94,7 +94,7 @@ impl Tile {
         for x in 0..n.min(TILE) {
             let [column, row] = [u, v].map(|at| (at >> POSITION_BITS) as usize);
             let first = row * stride + 3 * column;
-            // `has_all` has ensured that there is one pixel more than a position uses.
+            // `has_all` has checked that the source contains one pixel more than a position uses.
             let eight = |at: usize| {
                 let bytes = &source[at..at + 8];
                 u64::from_le_bytes(std::array::from_fn(|nth| bytes[nth]))

@@ -1,8 +1,8 @@
-//! The mean of bilinear samples, for maps that turn or enlarge.
+//! The mean of bilinear samples, for maps that rotate or enlarge.
 //!
-//! All samples of an output pixel are one weighted sum of the source pixels around its centre. The
-//! weights depend only on the position of the centre between source pixels. They are therefore tabulated per
-//! *phase*, and a pixel costs one short integer correlation, regardless of the number of samples.
+//! All samples of an output pixel are one weighted sum of the source pixels around its centre. The weights depend only on the position of
+//! the centre between source pixels. They are therefore tabulated for each *phase* (that position, rounded), and each pixel takes one short
+//! integer correlation, regardless of the number of samples.
 
 use super::{Affine, Fill};
 use crate::Size;

@@ -6,7 +6,7 @@ use std::process::Command;
 use footage::Size;
 use image::RgbImage;
 
-/// Size of the clip, odd on purpose, so that rows are not aligned.
+/// Size of the clip. It is odd on purpose, so that rows are not aligned in memory.
 pub(crate) const SIZE: Size = Size::new(67, 45);
 
 /// Returns a ramp with a moving square. Every frame differs in every channel.
@@ -29,7 +29,7 @@ pub(crate) fn write_images(folder: &Path, n: usize) {
     }
 }
 
-/// Returns true if there is an ffmpeg. Otherwise, prints that the test is skipped.
+/// Returns true if ffmpeg is available. Otherwise, prints that the test is skipped.
 #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 pub(crate) fn has_ffmpeg() -> bool {
     let is_there = Command::new("ffmpeg").arg("-version").output().is_ok();

@@ -1,4 +1,4 @@
-//! Kind that a card declares, read before its keys.
+//! The kind of network that a card declares; it is read before the other keys.
 
 use serde::Deserialize;
 
@@ -21,7 +21,7 @@ pub enum CardKind {
 }
 
 impl CardKind {
-    /// Returns the kind that a text declares; `None` if it declares none.
+    /// Returns the kind that a text declares; `None` if it does not declare a kind.
     pub fn of(text: &str) -> Option<Self> {
         let head: Head = toml::from_str(text).ok()?;
         match head.format.as_str() {
@@ -32,7 +32,7 @@ impl CardKind {
     }
 }
 
-/// Beginning of any card.
+/// The keys with which any card begins.
 #[derive(Debug, Deserialize)]
 struct Head {
     format: String,

@@ -1,4 +1,4 @@
-//! Tests of cards that are read, and of cards that are refused.
+//! Tests of cards that are accepted and of cards that are rejected.
 
 use proptest::prelude::*;
 

@@ -2,16 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Method of refining a maximum of a map.
+/// How the position of a maximum of a map is refined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Refine {
-    /// The maximum is not refined.
+    /// The position is not refined.
     None,
-    /// The maximum is moved by a quarter of a cell towards the higher neighbour.
+    /// The position is moved by a quarter of a cell towards the higher neighbour.
     #[default]
     Quarter,
-    /// The maximum is the maximum of a parabola through logarithms (DARK: Zhang et al. 2020, without its smoothing).
+    /// The position is that of the maximum of a parabola through the logarithms (DARK: Zhang et al. 2020, without its smoothing).
     Parabola,
 }
 
@@ -19,7 +19,7 @@ pub enum Refine {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Score {
-    /// The value is a number from 0 to 1.
+    /// The value is a score from 0 to 1.
     #[default]
     Share,
     /// The value is log-odds, whose logistic function is the score.

@@ -5,7 +5,8 @@ use super::PersonBox;
 /// Maximum absolute logarithm of a side. No network returns a larger logarithm for a picture of 2048 pixels.
 const MOST_LOGARITHM: f64 = 8.0;
 
-/// Returns the boxes of the cells that are higher than their neighbours, in pixels of the input. Of equal neighbours, the first one counts.
+/// Returns the boxes of the cells that are higher than their neighbours, in pixels of the input. Among equal neighbours, only the first one
+/// counts.
 ///
 /// * `values`: log-odds, then logarithms of the distances to left, top, right and bottom, in cells, each of them `[rows, columns]`.
 /// * `stride`: number of pixels per cell.
@@ -50,7 +51,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [12, 8];
 
-    /// Returns a heat of -9 except for the given cells, each of which has a box with these sides, in cells.
+    /// Returns log-odds of -9 except in the given cells, each of which has a box with these sides, in cells.
     fn values(cells: &[([usize; 2], f32, [f32; 4])]) -> Vec<f32> {
         let n = SIZE[0] * SIZE[1];
         let mut values = vec![-9.0; n];
@@ -99,7 +100,7 @@ mod tests {
     }
 
     proptest! {
-        /// No two boxes come from cells that touch, all score enough, and every side is finite.
+        /// Checks that no two boxes come from cells that touch, that all scores are high enough, and that every side is finite.
         #[test]
         fn boxes_are_finite_and_of_cells_apart(
             heat in prop::collection::vec(-3.0_f32..3.0, 96),

@@ -61,7 +61,7 @@ enum ImageId {
 }
 
 impl ImageId {
-    /// Returns the number. For a text, these are its last digits before the file extension.
+    /// Returns the number. If the value is a text, the number is formed by its last digits before the file extension.
     fn number(&self) -> Option<u64> {
         let text = match self {
             Self::Number(number) => return Some(*number),
@@ -89,11 +89,11 @@ impl fmt::Display for ImageId {
 
 /// Reads a file of COCO or of mmpose.
 ///
-/// The frames of a data set are its images in the order of their `id`. The frames of results are their `image_id` itself. The third
-/// number of a keypoint in a data set is 0 if it is not labelled; otherwise it counts as a score, at most 1. In results, it is the score.
-/// Annotations of categories other than people are ignored.
+/// In a data set, frames are the images in the order of their `id`. In results, the `image_id` is the frame number. In a data set, the
+/// third number of a keypoint is 0 if the keypoint is not labelled; otherwise, it is used as a score, limited to 1. In results, it is the
+/// score. Annotations of categories other than people are ignored.
 ///
-/// * `names`: names of the keypoints. If `None`, they follow from the category, or else from the number of keypoints
+/// * `names`: names of the keypoints. If `None`, they are taken from the category or, failing that, derived from the number of keypoints
 ///   ([`NameSet::of_number`]).
 ///
 /// # Errors
@@ -176,7 +176,7 @@ fn results(entries: &[Entry], names: Option<&NameSet>) -> Result<Film, FileError
 /// Returns the people of all entries.
 ///
 /// * `list`: name of the list of entries, for errors.
-/// * The last argument has two functions: one selects the entries to read, the other returns the frame of an image.
+/// * The last argument consists of two functions: one selects the entries to read, the other returns the frame of an image.
 fn collected(
     entries: &[Entry],
     list: &str,

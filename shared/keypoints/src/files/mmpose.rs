@@ -1,4 +1,4 @@
-//! The layouts of mmpose: the people of a picture, or of the frames of a video, with positions and scores in separate lists.
+//! The layouts of mmpose: the people of a picture, or of the frames of a video. Positions and scores are in separate lists.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ enum Frames {
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum File {
-    /// Output of mmpose's demonstrations.
+    /// Output of mmpose's demonstration scripts.
     Described {
         #[serde(default)]
         meta_info: Meta,
@@ -53,7 +53,7 @@ struct Meta {
     keypoint_id2name: BTreeMap<String, String>,
 }
 
-/// Returns true if a text has one of the keys that no other layout has.
+/// Returns true if a text contains one of the keys that occur in no other layout.
 pub(super) fn is_mmpose(text: &[u8]) -> bool {
     let has = |key: &[u8]| text.windows(key.len()).any(|part| part == key);
     let head = &text[..text.len().min(1 << 16)];
@@ -131,7 +131,7 @@ fn read(text: &[u8]) -> Result<(Option<NameSet>, Frames), FileError> {
 }
 
 impl Meta {
-    /// Returns the names in the file, or a known set if the number and the names of the keypoints match it.
+    /// Returns the names in the file, or a known set if it has the same number of keypoints and the same names.
     fn names(&self) -> Result<Option<NameSet>, FileError> {
         let mut named: Vec<(usize, &String)> = Vec::new();
         for (number, name) in &self.keypoint_id2name {

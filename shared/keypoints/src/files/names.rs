@@ -34,7 +34,7 @@ pub enum NamesError {
         /// Name that occurs twice.
         name: String,
     },
-    /// No joint of the skeleton follows from the keypoints.
+    /// No joint of the skeleton can be computed from the keypoints.
     #[error(
         "no joint of the skeleton can be derived from the keypoints {names}: expected names such as \"left shoulder\""
     )]
@@ -93,7 +93,7 @@ impl NameSet {
             })
     }
 
-    /// Returns the set that programs write with this number of keypoints: 17 for `coco-17`, 18 for `openpose-18`, 25 for `body-25`,
+    /// Returns the set that programs use if they write this number of keypoints: 17 for `coco-17`, 18 for `openpose-18`, 25 for `body-25`,
     /// 26 for `halpe-26`, and the sets of [`WHOLE_BODIES`].
     pub fn of_number(n: usize) -> Option<Self> {
         let body: &[&str] = match n {

@@ -19,7 +19,7 @@ struct File {
     people: Vec<Person>,
 }
 
-/// A person. The identity, and the keypoints of face and hands, are not read.
+/// A person. The person's id, and the keypoints of face and hands, are not read.
 #[derive(Deserialize)]
 struct Person {
     /// Numbers of the keypoints. They are missing or empty if a program keeps the entry of a person that it did not find. Before version
@@ -37,7 +37,7 @@ impl Person {
 /// Reads the file of a frame of `OpenPose` or of mmpose. A keypoint was not found if all its three numbers are 0, or if one of them is not
 /// a number.
 ///
-/// * `names`: names of the keypoints. If `None`, they follow from the number of keypoints ([`NameSet::of_number`]).
+/// * `names`: names of the keypoints. If `None`, they are derived from the number of keypoints ([`NameSet::of_number`]).
 ///
 /// # Errors
 ///
@@ -48,7 +48,7 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
         return mmpose::frame(text, names);
     }
     if text.trim_ascii() == b"[]" {
-        // This is a picture of mmpose in which no person was found.
+        // This is a picture from mmpose in which no person was found.
         return people_of(&[], names, |_| String::new());
     }
     let file: File = from_json(text, LAYOUT)?;
@@ -61,7 +61,7 @@ pub fn parse(text: &[u8], names: Option<&NameSet>) -> Result<Frame, FileError> {
     people_of(&lists, names, entry)
 }
 
-/// Refuses a person whose keypoints have keys that are not read.
+/// Returns an error for a person whose keypoints are stored under keys that are not read.
 fn other_keys(text: &[u8]) -> Result<(), FileError> {
     #[derive(Deserialize)]
     struct Whole {

@@ -28,7 +28,7 @@ pub struct Film {
 
 /// Returns the people of lists of numbers.
 ///
-/// * `entry`: returns the name of a person's list, for errors.
+/// * `entry`: function that returns the name of a person's list, for errors.
 pub(super) fn people_of(
     lists: &[&[Option<f64>]],
     names: Option<&NameSet>,

@@ -28,7 +28,7 @@ impl SeenKeypoints {
 /// Reason why a file of keypoints cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The text is not JSON of the layout.
+    /// The text is not JSON with the expected layout.
     #[error("expected {layout}: {source}")]
     Json {
         /// Description of the layout.
@@ -78,7 +78,7 @@ pub enum FileError {
         /// Number of keypoints.
         n: usize,
     },
-    /// People have keypoints, but not of the body, or under another key.
+    /// A person has keypoints, but none of the body, or only under another key.
     #[error(
         "`{entry}` has no `pose_keypoints_2d` with keypoints of the body in the picture; it has only {}",
         .keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
@@ -119,7 +119,7 @@ pub enum FileError {
     },
 }
 
-/// Refuses a number of items above the maximum.
+/// Returns an error if the number of items is above the maximum.
 pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileError> {
     if got <= most {
         return Ok(());
@@ -134,8 +134,8 @@ pub(crate) fn at_most(got: usize, most: usize, what: &str) -> Result<(), FileErr
 /// Returns the person of a list of numbers, which has column, row and a third number for every keypoint. A keypoint with a missing number
 /// was not found. An empty list is a person without keypoints. Numbers after the named keypoints are not read.
 ///
-/// * `entry`: returns the name of the list, for errors.
-/// * `is_found`: returns true if three numbers are a keypoint that was found.
+/// * `entry`: function that returns the name of the list, for errors.
+/// * `is_found`: function that returns true if the three numbers are those of a keypoint that was found.
 pub(crate) fn person(
     values: &[Option<f64>],
     names: &NameSet,
@@ -183,7 +183,7 @@ pub(crate) fn person(
     })
 }
 
-/// Returns the set of names that follows from the number of values.
+/// Returns the set of names for the given number of values.
 pub(crate) fn told_by(n_values: usize, entry: impl Fn() -> String) -> Result<NameSet, FileError> {
     if !n_values.is_multiple_of(3) {
         return Err(FileError::Length {

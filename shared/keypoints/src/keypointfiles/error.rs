@@ -40,7 +40,7 @@ pub enum KeypointFileError {
         /// Path of the folder.
         path: PathBuf,
     },
-    /// The name of a file has no number, or one that is too large.
+    /// The name of a file contains no number, or a number that is too large.
     #[error("the name of {} has no frame number before .json: expected a name such as cam01_000000000012_keypoints.json", path.display())]
     NoNumber {
         /// Path of the file.
@@ -66,7 +66,7 @@ pub enum KeypointFileError {
         /// Maximum number of frames.
         most: u64,
     },
-    /// No file has a person, so the names of the keypoints are not known.
+    /// No file contains a person, so the names of the keypoints are unknown.
     #[error("no file in {} has a person: set the names of the keypoints (`keypoint_names`)", path.display())]
     Nobody {
         /// Path of the folder.
@@ -82,7 +82,7 @@ pub enum KeypointFileError {
     NotBody25 {
         /// Path of the folder or file.
         path: PathBuf,
-        /// Distance of the pelvis from the middle of the hips, as a share of the longer side of a person's box.
+        /// Distance of the pelvis from the middle of the hips, as a fraction of the longer side of a person's box.
         off: f64,
     },
 }

@@ -1,15 +1,15 @@
 //! Checks whether 25 keypoints without names are arranged like those of `body-25`.
 //!
 //! OpenPose has two sets of 25 keypoints, and files do not state which of them they use: `body-25`, and `body-25b` of its experimental
-//! model. The first set has a pelvis in the middle of the hips. The second set has an elbow, a wrist and a hip in place of the pelvis and
-//! the hips, which are apart from each other.
+//! model. The first set has a pelvis in the middle of the hips. The second set has an elbow, a wrist and a hip at the positions of the
+//! pelvis and the two hips in the first set; these three points are far from each other.
 
 use crate::BODY_25;
 use crate::files::SeenKeypoints;
 
 /// Maximum distance of the pelvis from the middle of the hips, as a share of the longer side of a person's box. If the distance is larger
-/// in half of the people, the point is not the pelvis. In the demonstration of Pose2Sim, which is `body-25b`, the median of a camera is
-/// 0.17 to 0.51.
+/// in half of the people, the point is not the pelvis. In the demonstration of Pose2Sim, which uses `body-25b`, the median for each camera
+/// is 0.17 to 0.51.
 const MOST_OFF: f64 = 0.1;
 
 /// Returns the median distance of the pelvis from the middle of the hips. Returns `None` if it is small enough, or if no person

@@ -1,4 +1,4 @@
-//! Source of the people of every frame.
+//! Reads the people of every frame.
 
 use std::collections::BTreeMap;
 use std::io::Read as _;
@@ -11,10 +11,10 @@ use crate::keypointfiles::error::KeypointFileError;
 use crate::keypointfiles::folder;
 use crate::keypointfiles::order::pelvis_off;
 
-/// Maximum size of the file of one frame, and of the file of all frames, in bytes.
+/// Maximum size of the file of one frame, in bytes; the next constant is the maximum size of the file of all frames.
 const MOST_OF_FRAME: u64 = 16 << 20;
 const MOST_OF_FILM: u64 = 1 << 30;
-/// Number of files with people that are read to find out which 25 keypoints they have.
+/// Number of files with people that are read to find out which set the 25 keypoints belong to.
 const N_LOOKED_AT: usize = 20;
 
 /// The keypoints of a film, by the numbers of its frames.
@@ -36,11 +36,11 @@ enum Frames {
 impl KeypointSource {
     /// Opens a folder of JSON files in OpenPose's layout, or one JSON file in COCO's.
     ///
-    /// A file's frame is the last number in its name, counted from the lowest one of the folder. A number without a file
-    /// is a frame without keypoints. Files that do not end in `.json` are ignored.
+    /// The frame number of a file is the last number in its name, minus the lowest such number in the folder. If a number has no file, its
+    /// frame has no keypoints. Files that do not end in `.json` are ignored.
     ///
-    /// * `names`: names of the keypoints. If `None`, they follow from the number of keypoints or from the category in the files. In this
-    ///   case, the files of a folder are read up to the first person, or a few more.
+    /// * `names`: names of the keypoints. If `None`, they are derived from the number of keypoints or from the category in the files. To do
+    ///   so, the files of a folder are read up to the first person, or a few more.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl KeypointSource {
 
     /// Reads the people of a frame, counted from 0, in the order of its file.
     ///
-    /// Returns the number of people; `None` if the files do not have the frame (a gap, or beyond the end).
+    /// Returns the number of people; `None` if the frame is not in the files (in a gap, or after the end).
     ///
     /// * `people`: replaced by the people of the frame; empty if there are none.
     ///
@@ -120,7 +120,7 @@ impl KeypointSource {
     }
 }
 
-/// Returns the names that follow from the first file with a person.
+/// Returns the names that are derived from the first file with a person.
 fn told(folder: &Path, files: &[(u64, PathBuf)]) -> Result<NameSet, KeypointFileError> {
     let mut told: Option<NameSet> = None;
     let mut people = Vec::new();
@@ -149,7 +149,7 @@ fn is_body_25(names: &NameSet) -> bool {
     names.names() == BODY_25
 }
 
-/// Refuses 25 keypoints that are not `body-25`.
+/// Returns an error for 25 keypoints that are not those of `body-25`.
 fn checked(
     path: &Path,
     people: &mut dyn Iterator<Item = &SeenKeypoints>,

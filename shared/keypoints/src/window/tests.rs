@@ -57,7 +57,7 @@ fn the_input_is_the_picture_prepared_as_the_card_says() {
     let mut card = card();
     (card.crop.margin, card.crop.fill) = (1.0, 9);
     (card.input.scale, card.input.mean, card.input.std) = (0.5, [1.0, 2.0, 3.0], [2.0, 4.0, 8.0]);
-    // The picture has one colour. In the middle of the window, one pixel of the picture is one pixel of the input.
+    // The picture has a single colour. In the middle of the window, one pixel of the picture is one pixel of the input.
     let rgb: Vec<u8> = [10, 20, 30].repeat(96 * 128);
     let window = Window::new(&card, [0.0, 0.0, 96.0, 128.0]).unwrap();
     let mut values = vec![f32::NAN; 3 * 96 * 128];

@@ -132,7 +132,7 @@ fn one_file_in_the_layout_of_coco_has_all_frames() {
     assert!(error.to_string().contains("frame.json: expected"));
 }
 
-/// Returns a frame of one upright person with those keypoints of a set whose names are listed below.
+/// Returns a frame of one upright person, with the keypoints of a set whose names are listed below.
 fn upright(names: &[&str]) -> String {
     let at = |name: &str| match name {
         "pelvis" => [101.0, 100.0],
