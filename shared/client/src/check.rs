@@ -11,7 +11,7 @@ pub(crate) fn stamp(stamp: &Stamp, running: &Running, view: usize) -> bool {
     stamp.session == running.session && stamp.view as usize == view
 }
 
-/// Returns true if the counts of skeletons match the deployment, identities are unique, and all numbers are finite.
+/// Returns true if the counts of skeletons match the deployment, if ids are unique, and if all numbers are finite.
 pub(crate) fn skeletons(message: &Skeletons, running: &Running) -> bool {
     let n_people = message.n_people as usize;
     let people = message.listed();

@@ -18,7 +18,7 @@ use crate::joiner::Joiner;
 use crate::moment::{Buffers, Picture};
 use crate::wish::Wish;
 
-/// Maximum number of messages that one pass takes from a port, so that the pass ends.
+/// Maximum number of messages that are taken from a port before the next port's turn.
 const MOST_A_TURN: usize = 64;
 /// Time that a deployment may take to start.
 const STARTING: Duration = Duration::from_secs(5);

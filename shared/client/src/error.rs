@@ -11,7 +11,8 @@ pub enum ClientError {
     /// The text is not a valid name of a deployment.
     #[error(transparent)]
     Namespace(#[from] NamespaceError),
-    /// The deployment does not run, has no place for another client, or sends another version. The error names the deployments that run.
+    /// The deployment is not running, already has the maximum number of clients, or sends another version of the messages. The error names
+    /// the running deployments.
     #[error(transparent)]
     Guest(#[from] GuestError),
     /// The description of the deployment is missing, damaged, or of another version.
@@ -39,12 +40,12 @@ pub enum ClientError {
 }
 
 impl ClientError {
-    /// Returns true if the only reason is that the deployment does not run.
+    /// Returns true if the only reason is that the deployment is not running.
     pub fn is_not_running(&self) -> bool {
         matches!(self, Self::Guest(GuestError::NotRunning { .. }))
     }
 
-    /// Returns a remedy to try, if one is known.
+    /// Returns something that the user can try, if a remedy is known.
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Guest(error) => failure::Fault::hint(error),

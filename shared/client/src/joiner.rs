@@ -45,9 +45,9 @@ pub(crate) struct Joiner<P> {
     wish: Wish,
     n_views: usize,
     pending: BTreeMap<u64, Gathered<P>>,
-    /// Number of the first frame that may still be given to the caller.
+    /// Number of the next frame that may be given to the caller; earlier frames have passed.
     next: u64,
-    /// Number of parts that arrived after their frame, and of frames that were given up.
+    /// Number of parts that arrived after their frame had passed, and of frames that were given up.
     pub(crate) n_late: u64,
 }
 
@@ -89,7 +89,7 @@ impl<P> Joiner<P> {
         self.pending.clear();
     }
 
-    /// Returns the place for the parts of a frame; `None` if the frame has passed.
+    /// Returns the entry for the parts of a frame; `None` if the frame has already passed.
     fn frame(&mut self, stamp: &Stamp, now: Instant) -> Option<&mut Gathered<P>> {
         if stamp.frame < self.next {
             self.n_late += 1;
@@ -201,7 +201,7 @@ mod tests {
         joiner.add_skeletons(Box::new(skeletons(4)), now);
         assert_eq!(joiner.take(now).len(), 0, "too late");
         assert_eq!(joiner.n_late, 2);
-        // The result states that a view is missing.
+        // The skeleton message states that a view is missing.
         joiner.add_pose(1, pose(6), now);
         joiner.add_skeletons(Box::new(skeletons(6)), now);
         let given = joiner.take(now);

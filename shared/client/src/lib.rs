@@ -20,16 +20,16 @@
 //! }
 //! ```
 //!
-//! [`Client::next`] gives one [`Moment`] for each frame. It has the people and, on request, the pose and the picture of every view.
-//! A thread reads the deployment and matches these parts by the number of the frame. It keeps a limited number of moments for the
+//! [`Client::next`] returns one [`Moment`] for each frame. A moment contains the people and, on request, the pose and the picture of every
+//! view. A thread reads the deployment and matches these parts by the number of the frame. It keeps a limited number of moments for the
 //! caller: either only the newest moment, or every moment in order ([`Wish::every_frame`]).
 //!
-//! A client cannot send anything to the deployment: neither this crate nor [`runtime::Guest`], on which it is based, has a function
-//! for it. The pipeline does not wait for a client, does not wake it, and does not count it among its receivers. If a process of the
-//! deployment restarts, the client receives its messages again without any action. When the deployment ends, the client leaves it, and
-//! joins the next deployment with the same name ([`Client::state`]).
+//! A client cannot send anything to the deployment: neither this crate nor [`runtime::Guest`], on which it is based, has a function for it.
+//! The pipeline does not wait for a client, does not wake it, and does not count it among its receivers. If a process of the deployment
+//! restarts, the client receives its messages again without any action. When the deployment ends, the client disconnects, and connects to
+//! the next deployment with the same name ([`Client::state`]).
 //!
-//! The client checks every message before the caller receives it: session, counts, sizes and numbers. Invalid messages are refused and
+//! The client checks every message before the caller receives it: session, counts, sizes and numbers. Invalid messages are rejected and
 //! counted ([`Client::losses`]).
 #![forbid(unsafe_code)]
 

@@ -8,7 +8,7 @@ use runtime::Seen;
 
 use crate::lock::lock;
 
-/// All requested parts of one frame that are available.
+/// Everything that was requested about one frame and is available.
 #[derive(Debug)]
 pub struct Moment {
     /// The deployment's description of itself: names of joints and cameras.
@@ -24,11 +24,11 @@ pub struct Moment {
     /// True if all requested parts are available.
     pub is_complete: bool,
     /// Number of frames between the previous moment and this one that were not given to the caller. The pipeline skipped them, they were
-    /// lost with a process, or newer frames replaced them. 0 for the first moment of a run.
+    /// lost with a process, or newer frames replaced them. It is 0 for the first moment of a run.
     pub n_missed: u64,
 }
 
-/// Parts of a moment that belong to one view.
+/// The parts of a [`Moment`] that belong to one view.
 #[derive(Debug)]
 pub struct ViewMoment {
     /// Index of the view.
@@ -114,7 +114,7 @@ impl<'a> Skeleton<'a> {
         self.message
     }
 
-    /// Returns the person's identity within the run, counted from 1.
+    /// Returns the person's id within the run, counted from 1.
     pub fn id(self) -> u64 {
         self.message.id
     }
@@ -171,8 +171,8 @@ fn named<'a>((name, joint): (&'a String, &Joint3d)) -> Joint<'a> {
 
 /// The picture of one view.
 ///
-/// Without skeletons, the pixels stay in the memory of the sender and are not copied. With skeletons, the picture has to wait for the
-/// skeleton, and the sender cannot spare its memory for so long. The picture is therefore a copy, in memory that is reused.
+/// Without skeletons, the pixels stay in the memory of the sender and are not copied. If skeletons are requested too, the picture has to
+/// wait for the skeleton, and the sender needs its memory before that. The picture is then a copy, in memory that is reused.
 #[derive(Debug)]
 pub struct Picture {
     pixels: Pixels,

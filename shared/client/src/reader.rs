@@ -17,9 +17,9 @@ use crate::wish::Wish;
 
 /// Pause between two checks of the ports, because no sender wakes a client.
 const PAUSE: Duration = Duration::from_millis(1);
-/// Interval at which the reader checks that the deployment still runs. The reader has a second to leave.
+/// Interval at which the reader checks that the deployment is still running. The reader has a second to disconnect.
 const CHECK: Duration = Duration::from_millis(100);
-/// Pause between two attempts to join a deployment that does not run.
+/// Pause between two attempts to connect to a deployment that is not running.
 const RETRY: Duration = Duration::from_millis(200);
 
 /// Reads a deployment.
@@ -29,16 +29,16 @@ const RETRY: Duration = Duration::from_millis(200);
 pub struct Client {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
-    /// Session and frame of the last moment that was given.
+    /// Session and frame of the last [`Moment`] that the reader returned.
     last: Option<(u64, u64)>,
 }
 
 /// State of the connection to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
-    /// The deployment runs, and the client reads it.
+    /// The deployment is running, and the client reads it.
     Connected,
-    /// The deployment does not run. The client joins it when it starts.
+    /// The deployment is not running. The client connects to it when it starts.
     Waiting,
 }
 
@@ -47,7 +47,7 @@ pub enum State {
 pub struct Losses {
     /// Messages of another run, or with impossible counts or numbers.
     pub refused: u64,
-    /// Parts that arrived after their frame, and frames whose requested skeleton did not arrive.
+    /// Parts that arrived after their frame had passed, and frames whose requested skeleton did not arrive.
     pub late: u64,
     /// Moments that were dropped because newer moments arrived before the caller took them. When the deployment ends, moments that hold its
     /// pictures are dropped as well.
@@ -71,22 +71,22 @@ struct Inner {
 }
 
 impl Client {
-    /// Joins a deployment that runs.
+    /// Connects to a running deployment.
     ///
     /// # Errors
     ///
-    /// Returns a [`ClientError`] if the deployment cannot be joined. If it does not run, the error names the deployments that do.
+    /// Returns a [`ClientError`] if the client cannot connect. If the deployment is not running, the error names the deployments that are.
     pub fn open(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         let connection = Connection::open(deployment, wish)?;
         Self::start(deployment, wish, Some(connection))
     }
 
-    /// Joins a deployment now, or as soon as it runs.
+    /// Connects to a deployment now, or as soon as it is running.
     ///
     /// # Errors
     ///
-    /// Returns a [`ClientError`] if the deployment cannot be joined. It is not an error if the deployment does not run.
+    /// Returns a [`ClientError`] if the client cannot connect. It is not an error if the deployment is not running.
     pub fn wait_for(deployment: &str, wish: &Wish) -> Result<Self, ClientError> {
         check_wish(wish)?;
         match Connection::open(deployment, wish) {
@@ -162,7 +162,7 @@ impl Client {
         lock(&self.shared.inner).running.clone()
     }
 
-    /// Returns the losses since the client was made.
+    /// Returns the losses since the client was created.
     pub fn losses(&self) -> Losses {
         lock(&self.shared.inner).losses
     }

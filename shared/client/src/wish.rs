@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-/// Parts of every frame that a client takes, and the choice of frames that it receives.
+/// Which parts of every frame a client takes, and which frames it receives.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wish {
     pub(crate) skeletons: bool,

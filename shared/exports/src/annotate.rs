@@ -33,13 +33,13 @@ pub fn draw(canvas: &mut Canvas, trials: &[Trial], slot: usize, view: &ViewCamer
     canvas.label([2.0, 2.0], text.trim_end(), CENTRE);
 }
 
-/// Returns the trial whose status is used as the status of the frame: a trial with a person in it, if there is one.
+/// Returns the trial whose status is used for the whole frame: one with a person in this frame, if there is one.
 fn best(trials: &[Trial], slot: usize) -> Option<&Trial> {
     let is_there = |trial: &&Trial| trial.slots[slot].points.iter().any(Result::is_ok);
     trials.iter().find(is_there).or(trials.first())
 }
 
-/// Draws a person. Returns the upper left corner of the part that the view sees.
+/// Draws a person. Returns the upper left corner of the visible part.
 fn person(canvas: &mut Canvas, trial: &Trial, slot: usize, view: &ViewCamera) -> Option<[f64; 2]> {
     let seen: Vec<Option<Seen>> = trial
         .points(slot)

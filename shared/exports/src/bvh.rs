@@ -52,7 +52,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(notes(trial, &lengths, &is_there, &held))
 }
 
-/// Returns the nodes that the file has: those that were seen, and those that point towards a seen node.
+/// Returns which nodes are written: those that were seen, and those that point towards a seen node.
 fn is_there(lengths: &[Option<f64>; N_NODES]) -> [bool; N_NODES] {
     let mut is_there = [true; N_NODES];
     for (index, node) in NODES.iter().enumerate().skip(1) {
@@ -126,7 +126,8 @@ fn zxy(turn: &UnitQuaternion<f64>) -> [f64; 3] {
     ]
 }
 
-/// Returns the same angles, shifted by whole turns to be as near as possible to the last ones, so that programs may interpolate.
+/// Returns the same angles, shifted by whole turns to be as near as possible to the last ones, because programs may interpolate between
+/// them.
 fn unwrapped(angles: [f64; 3], last: [f64; 3]) -> [f64; 3] {
     let turn = core::f64::consts::TAU;
     core::array::from_fn(|i| angles[i] + ((last[i] - angles[i]) / turn).round() * turn)

@@ -23,7 +23,7 @@ pub struct FileFormat {
     pub suffix: &'static str,
     /// Unit of lengths.
     pub unit: &'static str,
-    /// Directions of the axes.
+    /// Directions of the coordinate axes.
     pub axes: &'static str,
     /// Representation of a gap in the format.
     pub gaps: &'static str,

@@ -1,9 +1,9 @@
 //! GLB (glTF 2.0, binary): a skinned skeleton with its animation; metres, y up.
 //!
 //! The nodes are the nodes of this crate's tree. Their rotations and positions are the measured ones of every frame, so that joints have
-//! the positions of the run and bones have their measured lengths. Every bone has a piece of the skin on a separate node. This node is
-//! scaled to nothing if an end of the bone was not seen, because glTF would otherwise interpolate. Standard deviations and gaps of all
-//! points are in the extras of the animation.
+//! the positions of the run and bones have their measured lengths. Every bone has a piece of the skin on a separate node. If an end of the
+//! bone was not seen, this node is scaled to zero, because glTF would otherwise interpolate. Standard deviations and gaps of all points are
+//! in `extras` of the animation.
 
 mod mesh;
 mod store;
@@ -22,7 +22,7 @@ use store::Store;
 
 /// Length at rest of a bone that was never seen, in metres.
 const UNSEEN_M: f64 = 0.2;
-/// Length up to which a bone is not drawn, in metres, because matrices divide by the length.
+/// Length up to which a bone is not drawn, in metres; shorter bones would cause a division by nearly zero.
 const SHORTEST_M: f64 = 1e-4;
 /// Size of a keypoint's mark, in metres.
 const MARK_M: f64 = 0.02;
@@ -355,7 +355,7 @@ impl Animation {
     }
 }
 
-/// Returns the standard deviations, in metres, in the order of the frames, and the gaps as numbers of first and last frames.
+/// Returns the standard deviations, in metres, one for each frame, and the gaps, each as the numbers of its first and last frame.
 fn extras(trial: &Trial) -> Value {
     let of_point = |(nth, label): (usize, String)| {
         let deviations: Vec<Option<f64>> = (0..trial.slots.len())

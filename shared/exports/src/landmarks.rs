@@ -1,4 +1,4 @@
-//! Landmarks of the body, found by the names of the joints. Every set of joints has the same landmarks.
+//! Landmarks of the body, found by the names of the joints. All sets of joints use the same landmarks.
 
 use nalgebra::Point3;
 

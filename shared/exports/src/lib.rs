@@ -1,14 +1,14 @@
 //! Exports a run to the file formats of other programs, with one module for each format, and to pages ([`report`]).
 //!
-//! [`Gathering`] takes the lines of a run one by one and makes a [`Trial`] of them. A trial has every frame in its place on the grid of
-//! the frame rate, including gaps. [`FILES`] is the table of formats with one file per trial. Two formats have a file for every view and
-//! frame ([`openpose`]) or pictures ([`annotate`]), and need a [`ViewCamera`].
+//! [`Gathering`] takes the lines of a run one by one and makes a [`Trial`] of them. A trial has one entry for every instant at the frame
+//! rate, including instants without a frame (gaps). [`FILES`] is the table of formats with one file per trial. Two formats have a file for
+//! every view and frame ([`openpose`]) or pictures ([`annotate`]), and need a [`ViewCamera`].
 //!
 //! | format | unit | axes | representation of a gap |
 //! |---|---|---|---|
 //! | [`c3d`](FILES) | mm | z up | residual -1 |
 //! | `trc` | m | y up | NaN |
-//! | `glb` | m | y up | a bone that is not there (scale 0) |
+//! | `glb` | m | y up | a bone scaled to 0 |
 //! | `bvh` | cm | y up | the last rotation, and a note: the format has no gaps |
 //! | `csv`, `csv-long` | m | the rig's | empty cells |
 //! | `parquet` (a feature) | m | the rig's | null |

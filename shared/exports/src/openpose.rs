@@ -1,8 +1,8 @@
-//! Writes the 3D pose as each view sees it, in the keypoint format of `OpenPose`: a file for every view and frame, `BODY_25`.
+//! Writes the 3D pose as each view sees it, in the `BODY_25` keypoint format of `OpenPose`, with one file for every view and frame.
 //!
-//! The format has a confidence for every keypoint. Here, it is the share of the views from which the joint was triangulated.
-//! The standard deviation of the position in the picture has a separate key, which other programs ignore. A keypoint that was not found,
-//! is behind the camera, or is outside the picture is `0, 0, 0`.
+//! The format has a confidence for every keypoint. Here, this is the fraction of the views from which the joint was triangulated. The
+//! standard deviation of the position in the picture has a separate key, which other programs ignore. A keypoint is written as `0, 0, 0` if
+//! it was not found, is behind the camera, or is outside the picture.
 
 use keypoints::BODY_25;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use crate::{Seen, Trial, ViewCamera};
 /// Suffix of the file of a frame.
 pub const SUFFIX: &str = "_keypoints.json";
 
-/// Returns the file of a view and a frame, without people that were not found. `person_id` is -1 in a run of one person.
+/// Returns the file of a view and a frame. People who were not found in the frame are left out. `person_id` is -1 in a run of one person.
 pub fn frame(trials: &[Trial], slot: usize, view: &ViewCamera) -> String {
     let id = |trial: &Trial| (trials.len() > 1).then_some(trial.id());
     let people = trials.iter().filter_map(|trial| person(trial, id(trial), slot, view));
@@ -77,7 +77,7 @@ fn keypoint(
     }
     let share = f64::from(mean.views.count_ones()) / trial.views.len().max(1) as f64;
     let seen = view.see(&mean).filter(|seen| view.holds(seen.at))?;
-    // A joint whose views are not known was found nevertheless, and a share of zero would mean that it was not.
+    // If the views of a joint are not known, the joint was found nevertheless; a fraction of zero would mean that it was not.
     Some((seen, share.clamp(0.01, 1.0)))
 }
 

@@ -41,7 +41,7 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
     let turn = trial.z_up_from_world();
     let marker = |point: &Point| Marker {
         position: (turn * point.in_world * 1e3).into(),
-        // In this format, a residual of 0 means that the point was not measured.
+        // In C3D, a residual of 0 means that the point was not measured.
         residual: if point.is_filled {
             0.0
         } else {

@@ -3,10 +3,10 @@
 //! Every page is a single HTML file without other resources: no font, no picture, no style from elsewhere. The only script is the script of
 //! [`run`], which draws the skeleton in space.
 //!
-//! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were considered but not used.
-//! Most of the content of these pages is SVG, which is made in loops from numbers with a fixed number of digits; templates would not
-//! shorten it. The page of a model must also be valid XML, in which empty elements end with a slash, but `maud` writes only the empty
-//! elements of HTML. Each page has a test with text that would break the page if it were not escaped.
+//! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were considered but are not
+//! used, because most of the content of these pages is SVG made in loops from numbers, which templates would not shorten. The page of a
+//! model must also be valid XML, in which empty elements end with a slash, but `maud` writes only the empty elements of HTML. Each page has
+//! a test with text that would break the page if it were not escaped.
 
 pub mod html;
 pub mod parts;

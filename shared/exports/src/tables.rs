@@ -83,7 +83,7 @@ pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     Ok(Notes::new())
 }
 
-/// Returns the identity of the person; empty if it is not known.
+/// Returns the id of the person; empty if it is not known.
 fn person(trial: &Trial, slot: usize) -> String {
     let id = trial.id_at(slot);
     id.map_or(String::new(), |id| id.to_string())

@@ -1,9 +1,9 @@
 //! The skeleton in the form that animation programs use: a tree of nodes with rotations, in a T-pose at rest.
 //!
 //! At rest, the person stands with arms out, y up, looking along +z, with the left hand at +x. A node without its own landmark has the
-//! position of its parent, and its rotation points its child towards the measured position. Every bone therefore has its own rotation, and
-//! only the lengths of bones can differ from the measured ones. Joints do not show the rotation of a bone about its own axis, so it
-//! follows its parent.
+//! position of its parent, and its rotation points its child towards the child's measured position. Every bone therefore has its own
+//! rotation, and only the lengths of bones can differ from the measured ones. The joints do not show how a bone is rotated about its own
+//! axis, so in this respect it follows its parent.
 
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 
@@ -105,7 +105,7 @@ pub(crate) struct Posed {
     pub(crate) turn: [UnitQuaternion<f64>; N_NODES],
     /// Measured position of every node in its parent's frame; the last one if it was not seen.
     pub(crate) place: [Vector3<f64>; N_NODES],
-    /// True for a node whose rotation follows from the measurements of this frame, and for nodes that never rotate.
+    /// True for a node whose rotation could be computed from the measurements of this frame, and for nodes that never rotate.
     pub(crate) is_turn_seen: [bool; N_NODES],
 }
 

@@ -1,4 +1,4 @@
-//! Results of a run, with every frame in its place on the grid of the frame rate.
+//! Results of a run, with one entry for every instant at the frame rate (the grid).
 
 use std::collections::BTreeSet;
 
@@ -8,13 +8,13 @@ use skeleton::JointSet;
 
 use crate::Naming;
 
-/// Maximum number of places on the grid. It is more than a day at 50 Hz; a larger number comes from a wrong frame number.
+/// Maximum number of instants on the grid. It is more than a day at 50 Hz; a larger number is caused by a wrong frame number.
 const MAX_SLOTS: u64 = 5_000_000;
 /// Limit of coordinates, in metres. A larger coordinate counts as missing.
 const MAX_COORDINATE: f64 = 1e6;
 /// States of smoothed points that were not measured.
 const FILLED: [&str; 2] = ["filled", "rejected"];
-/// Maximum distance of a time from the grid, as a share of the grid's spacing.
+/// Maximum distance of a time from the grid, as a fraction of the grid's spacing.
 const TOLERANCE: f64 = 0.25;
 
 /// A point in space.
@@ -51,24 +51,24 @@ impl Point {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Gap(pub Box<str>);
 
-/// A place on the grid.
+/// An instant on the grid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Slot {
-    /// Identity of the person with these points; `None` if there is no person.
+    /// Id of the person with these points; `None` if there is no person.
     pub person: Option<u64>,
-    /// `ok`, or the reason why there is no skeleton; empty if the run left no line.
+    /// `ok`, or the reason why there is no skeleton; empty if the run has no line for this frame.
     pub status: Box<str>,
     /// Joints, then extra keypoints; empty if there is no result.
     pub points: Vec<Result<Point, Gap>>,
 }
 
-/// One person of a run. All trials of a run have the same slots. If the person is absent, the slot has no points.
+/// One person of a run. All trials of a run have the same instants (slots). If the person is absent at an instant, the slot has no points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Name of the run in the files.
     pub name: String,
-    /// Identities of the person within the run, ascending. There are several if no frame had two people and the followed
-    /// person had several identities, one after the other.
+    /// Ids of the person within the run, ascending. A person has several ids if no frame contains two people and the followed person had
+    /// several ids one after the other.
     pub ids: Vec<u64>,
     /// Naming of the points in the files.
     pub naming: Naming,
@@ -78,17 +78,17 @@ pub struct Trial {
     pub extras: Vec<String>,
     /// Names of the views, in the numbering of [`Point::views`].
     pub views: Vec<String>,
-    /// Places on the grid per second, if known.
+    /// Number of instants per second, if known.
     pub rate_hz: Option<f64>,
-    /// Number of the first place's frame in the footage.
+    /// Number, in the footage, of the first instant's frame.
     pub first_frame: u64,
-    /// Distance between the frame numbers of two neighbouring places.
+    /// Difference between the frame numbers of two neighbouring instants.
     pub frame_step: u64,
-    /// Direction against gravity, if the rig states it.
+    /// Upward direction in the world, if the rig states it.
     pub up_in_world: Option<UnitVector3<f64>>,
-    /// Frames on the grid.
+    /// The instants of the grid.
     pub slots: Vec<Slot>,
-    /// Number of frames whose place differs from their time by a quarter of the spacing or more.
+    /// Number of frames whose time differs from their instant on the grid by a quarter of the spacing or more.
     pub n_irregular: usize,
     /// Number of lines that were left out because an earlier line was about the same frame.
     pub n_repeated: usize,
@@ -112,38 +112,38 @@ impl Trial {
         names.map(|name| name.replace(' ', "_")).collect()
     }
 
-    /// Returns the lowest identity of the person.
+    /// Returns the lowest id of the person.
     pub fn id(&self) -> u64 {
         self.ids.first().copied().unwrap_or(0)
     }
 
-    /// Returns the identity of the person at a place; `None` if it is not known.
+    /// Returns the id of the person at an instant; `None` if it is not known.
     pub fn id_at(&self, slot: usize) -> Option<u64> {
         let only = self.ids.first().filter(|_| self.ids.len() == 1);
         self.slots[slot].person.or(only.copied())
     }
 
-    /// Returns the number of points of a place.
+    /// Returns the number of points of an instant.
     pub fn n_points(&self) -> usize {
         self.joints.joints.len() + self.extras.len()
     }
 
-    /// Returns a point of a place; `None` in a gap.
+    /// Returns a point at an instant; `None` in a gap.
     pub fn point(&self, slot: usize, point: usize) -> Option<&Point> {
         self.slots.get(slot)?.points.get(point)?.as_ref().ok()
     }
 
-    /// Iterates over all points of a place.
+    /// Iterates over all points at an instant.
     pub fn points(&self, slot: usize) -> impl Iterator<Item = Option<&Point>> {
         (0..self.n_points()).map(move |point| self.point(slot, point))
     }
 
-    /// Returns the number of a place's frame in the footage.
+    /// Returns the number, in the footage, of an instant's frame.
     pub fn frame(&self, slot: usize) -> u64 {
         self.first_frame + slot as u64 * self.frame_step
     }
 
-    /// Returns the time at which a place's frame was taken, in seconds after frame 0 of the footage.
+    /// Returns the time at which an instant's frame was taken, in seconds after frame 0 of the footage.
     pub fn time_s(&self, slot: usize) -> Option<f64> {
         let rate_hz = self.rate_hz?;
         Some(self.frame(slot) as f64 / self.frame_step as f64 / rate_hz)
@@ -171,7 +171,7 @@ impl Trial {
         runs
     }
 
-    /// Returns the number of places with at least one point.
+    /// Returns the number of instants with at least one point.
     pub fn n_with_points(&self) -> usize {
         let has = |slot: &&Slot| slot.points.iter().any(Result::is_ok);
         self.slots.iter().filter(has).count()
@@ -214,12 +214,12 @@ pub enum TrialError {
         first: u64,
         /// Number of the last frame.
         last: u64,
-        /// Number of places between the two frames.
+        /// Number of instants between the two frames.
         slots: u64,
     },
 }
 
-/// Status of a place with other people, but without this person.
+/// Status of an instant with other people, but without this person.
 const NOT_THERE: &str = "not there";
 
 /// Collects the lines of a run, one at a time and in any order, and makes a [`Trial`] for each person.
@@ -236,7 +236,7 @@ pub struct Gathering {
 struct Gathered {
     frame: u64,
     time_s: Option<f64>,
-    /// Status of the people who are not in the line.
+    /// Status of people who are not mentioned in the line.
     status: Box<str>,
     people: Vec<(u64, Slot)>,
 }
@@ -282,7 +282,7 @@ impl Gathering {
         Ok(())
     }
 
-    /// Finds the set that the joints belong to, and adds new extra keypoints.
+    /// Finds the joint set of a person, and adds new extra keypoints.
     fn know(&mut self, person: &PersonLine) -> Result<(), TrialError> {
         if self.joints.is_none() && !person.joints.is_empty() {
             let is_named = |set: &&'static JointSet| {
@@ -360,17 +360,17 @@ impl Gathering {
         self.frames.len()
     }
 
-    /// Returns the trials, one for each person who has a point in any frame, by ascending identity. If no frame has two people, there is
-    /// only one trial, because the followed person gets another identity after a gap or a jump.
+    /// Returns the trials, one for each person who has a point in any frame, by ascending id. If no frame has two people, there is only one
+    /// trial: the different ids are then assumed to be one person, who got another id after a gap or a jump.
     ///
-    /// * `rate_hz`: frames of the footage per second, used if no line has a time.
+    /// * `rate_hz`: frame rate of the footage, used if no line has a time.
     ///
     /// # Errors
     ///
     /// Returns a [`TrialError`] on failure.
     pub fn finish(mut self, name: &str, rate_hz: Option<f64>) -> Result<Vec<Trial>, TrialError> {
         let n_lines = self.frames.len();
-        // If two lines are about the same frame, the first one counts.
+        // If two lines are about the same frame, the first one is used.
         self.frames.sort_by_key(|line| line.frame);
         self.frames.dedup_by_key(|line| line.frame);
         let ends = self.frames.first().zip(self.frames.last());
@@ -426,9 +426,9 @@ impl Gathering {
             .collect())
     }
 
-    /// Puts the points of a person into the places of the grid.
+    /// Puts the points of a person into the instants of the grid.
     ///
-    /// * `is_one`: true if no frame has two people, so that the person in a frame is the followed one.
+    /// * `is_one`: true if no frame has two people, so that the person in every frame is the followed one.
     fn trial(&mut self, mut trial: Trial, is_one: bool) -> Trial {
         let n_points = trial.n_points();
         for line in &mut self.frames {

@@ -12,7 +12,7 @@ pub struct ViewCamera {
     pub name: String,
     /// Camera of the calibration, or camera of turned and scaled frames.
     pub camera: Camera,
-    /// Map from pixels of that camera to pixels of the pictures: two rows of an affine map.
+    /// Map from pixels of that camera to pixels of the pictures: the two rows of an affine map.
     pub picture_from_camera: [[f64; 3]; 2],
     /// Width and height of the pictures, in pixels.
     pub size: [u32; 2],

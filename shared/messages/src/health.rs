@@ -43,6 +43,6 @@ pub struct Health {
     pub n_total: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,
-    /// Number of refused messages by cause, see [`Refusal::ALL`].
+    /// Number of rejected messages by cause, see [`Refusal::ALL`].
     pub refused: [u64; Refusal::N],
 }

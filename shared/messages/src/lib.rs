@@ -1,9 +1,9 @@
 //! Plain data that crosses process boundaries, and the names of the topics.
 //!
-//! Every message begins with a [`Stamp`]. Its [`Status`] says that it carries a result, or why it has none. Its [`Timing`]
-//! has the times of receiving and sending. Counts come before fixed-size arrays; entries beyond the count are zero. Receivers
-//! must treat every count and index as untrusted (`wire` checks them). All messages are `Pod`: they have no padding and every
-//! bit pattern is valid, so they can be written to a file and read again.
+//! Every message begins with a [`Stamp`]. Its [`Status`] states that it carries a result, or why it has none. Its [`Timing`] has the times
+//! at which the input was received and the message was sent. Counts come before fixed-size arrays; entries beyond the count are zero.
+//! Receivers must treat every count and index as untrusted (`wire` checks them). All messages are `Pod`: they have no padding and every bit
+//! pattern is valid, so they can be written to a file and read again.
 #![forbid(unsafe_code)]
 
 mod evidence;

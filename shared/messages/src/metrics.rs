@@ -3,7 +3,7 @@
 use bytemuck_derive::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// Maximum number of rows of a [`Metrics`]: one row of waiting per view, and the rows that belong to no view.
+/// Maximum number of rows of a [`Metrics`]: one row of waiting times for each view, and the rows that do not belong to a view.
 pub const MAX_ROWS: usize = 24;
 /// Maximum length of a view name in [`Metrics`], in bytes; longer names are truncated.
 pub const MAX_NAME: usize = 32;
@@ -16,7 +16,7 @@ pub const NO_QUEUE: u32 = u32::MAX;
 /// Value of the number of people for a process that does not count them.
 pub const NO_PEOPLE: u32 = u32::MAX;
 
-/// Value of a measurement of a camera that does not exist yet.
+/// Value of a camera measurement that is not available yet.
 pub const UNMEASURED: i64 = i64::MIN;
 
 /// The metrics of a process since its last start.
@@ -51,9 +51,9 @@ pub struct Metrics {
     pub memory_bytes: u64,
     /// Peak physical memory of the process, in bytes.
     pub peak_memory_bytes: u64,
-    /// Number of frames or results that wait in the process, or [`NO_QUEUE`].
+    /// Number of frames or results that are waiting in the process, or [`NO_QUEUE`].
     pub queue: u32,
-    /// Maximum number of frames or results that ever waited, or [`NO_QUEUE`].
+    /// Maximum number of frames or results that were waiting at any time, or [`NO_QUEUE`].
     pub longest_queue: u32,
     /// Index of the process's view, or [`NO_VIEW`].
     pub view: u32,
@@ -73,36 +73,36 @@ pub struct Metrics {
 
 /// Counts of the pictures of a live camera since the process began.
 ///
-/// The camera either loses or delivers each picture that it makes. Each delivered picture is used, surplus, overtaken
-/// or refused, unless it is still being processed.
+/// Each picture that the camera takes is either lost or delivered. Each delivered picture is used, surplus, overtaken or rejected, unless
+/// it is still being processed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("CameraCounts.v3")]
 #[repr(C)]
 pub struct CameraCounts {
     /// Number of times that the camera was opened; 0 for footage.
     pub n_connections: u64,
-    /// Number of pictures that the camera made, from the camera's own picture numbers, or from its times if it has no numbers.
+    /// Number of pictures that the camera took, from the camera's own picture numbers, or from its times if it does not number pictures.
     pub n_made: u64,
-    /// Number of pictures that the camera made but never delivered.
+    /// Number of pictures that the camera took but did not deliver.
     pub n_lost: u64,
     /// Number of pictures that the camera delivered.
     pub n_delivered: u64,
     /// Number of delivered pictures that were sent on.
     pub n_used: u64,
-    /// Number of delivered pictures for which the grid of common instants had no place.
+    /// Number of delivered pictures that were not used because each common instant near them already had a picture.
     pub n_surplus: u64,
-    /// Number of delivered pictures that a newer one replaced because this process was slow.
+    /// Number of delivered pictures that were replaced by a newer one because this process was slow.
     pub n_overtaken: u64,
     /// Number of delivered pictures that are damaged, frozen or have an impossible time.
     pub n_refused: u64,
-    /// Pictures per second, in millionths, measured by the times of the camera; 0 if unknown.
+    /// Frame rate measured by the times of the camera, in millionths of a picture per second; 0 if unknown.
     pub rate_microhertz: u64,
     /// Time from the common instant until the last used picture was taken, in nanoseconds; negative if it was taken earlier.
     pub off_grid_nanos: i64,
     /// Median of `off_grid_nanos` over the last pictures, in nanoseconds, or [`UNMEASURED`].
     pub skew_nanos: i64,
-    /// Rate at which the camera falls behind the common instants, parts per billion, or [`UNMEASURED`]. Negative for a camera
-    /// that is faster.
+    /// Rate at which the camera falls behind the common instants, in parts per billion, or [`UNMEASURED`]. Negative if the camera runs
+    /// ahead.
     pub drift_ppb: i64,
     /// Shortest time from capture to arrival over the last ten seconds, by the clock of the camera, in nanoseconds;
     /// [`UNMEASURED`] if it is not known.
@@ -124,9 +124,9 @@ impl TimedBy {
     pub const DRIVER: Self = Self(1);
     /// The clock of the camera.
     pub const CAMERA: Self = Self(2);
-    /// The arrival of the pictures, which were taken earlier by the time of the transfer.
+    /// The arrival of the pictures. They were taken earlier, by the time that the transfer took.
     pub const ARRIVAL: Self = Self(3);
-    /// The arrival of the pictures, because the time that the camera gives is not plausible.
+    /// The arrival of the pictures, because the time stated by the camera is not plausible.
     pub const DISBELIEVED: Self = Self(4);
 
     /// Returns the name for messages to users.
@@ -177,7 +177,7 @@ impl Default for Metrics {
     }
 }
 
-/// Statistics of the durations of one span, in nanoseconds.
+/// Statistics of the durations of one span (a stage of processing), in nanoseconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("MetricsRow.v1")]
 #[repr(C)]
@@ -248,9 +248,9 @@ impl Span {
 /// Cause of a loss of messages or frames. The discriminant is the index into [`Metrics::n_dropped`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cause {
-    /// The frame source fell behind its clock and skipped frames.
+    /// The source of the frames fell behind its clock and skipped frames.
     BehindClock,
-    /// The process was busy, and newer frames replaced the lost ones.
+    /// The process was busy, so newer frames replaced the lost ones.
     Busy,
     /// The message arrived after its frame had been processed.
     Late,

@@ -14,10 +14,10 @@ pub const NO_CANDIDATE: u8 = u8::MAX;
 #[type_name("PersonMessage.v1")]
 #[repr(C)]
 pub struct PersonMessage {
-    /// Person's identity within the run, counted from 1; never reused for another person.
+    /// The person's id within the run, counted from 1; never reused for another person.
     pub id: u64,
-    /// Index of the person among the candidates of every view. [`NO_CANDIDATE`] if the view does not show the person, and beyond the
-    /// last view.
+    /// Index of the person among the candidates of every view. [`NO_CANDIDATE`] if the view does not show the person, or if there is no
+    /// such view.
     pub candidates: [u8; MAX_VIEWS],
 }
 
@@ -30,11 +30,11 @@ pub struct People {
     pub stamp: Stamp,
     /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// States whether there is at least one person, and if not, why.
+    /// Whether there is at least one person and, if not, why.
     pub status: Status,
     /// Number of valid people.
     pub n_people: u32,
-    /// Number of people that several views agree on, including people that are not in the list.
+    /// Number of people on whom several views agree, including people who are not in the list.
     pub n_seen: u32,
     /// Bit `v` is set if the candidates of view `v` arrived in time.
     pub views_present: u32,

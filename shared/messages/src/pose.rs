@@ -63,7 +63,7 @@ impl Searched {
     }
 }
 
-/// Value used instead of a colour if the trunk is not seen, or if there is no picture.
+/// Value used instead of a colour if the trunk is not visible, or if there is no picture.
 pub const NO_COLOUR: [f32; 3] = [-1.0; 3];
 
 /// The single-view result: distinct candidates, best first.
@@ -75,7 +75,7 @@ pub struct ViewPose {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// States whether there is a candidate, and if not, why.
+    /// Whether there is a candidate and, if not, why.
     pub status: Status,
     /// Number of valid candidates.
     pub n_candidates: u32,
@@ -83,7 +83,7 @@ pub struct ViewPose {
     pub width: u32,
     /// Height of the image, in pixels.
     pub height: u32,
-    /// Size of the responses that were sent as evidence, in bytes; 0 without a subscriber.
+    /// Size of the responses that were sent as evidence, in bytes; 0 if no process subscribes to them.
     pub evidence_bytes: u64,
     /// Time from the instant of the frame until the picture was taken, in nanoseconds, as in [`FrameHeader`](crate::FrameHeader).
     pub skew_nanos: i64,
@@ -91,8 +91,8 @@ pub struct ViewPose {
     pub searched: Searched,
     /// Number of extra keypoints per candidate: all keypoints that any view of the deployment provides.
     pub n_keypoints: u32,
-    /// The candidates. With the paper's method, they have cells. With the network method, they have a score only; `joints` and `heats` have
-    /// the rest.
+    /// The candidates. With the paper's method, they contain the cells of the parts. With the network method, they contain only a score;
+    /// the rest is in `joints` and `heats`.
     pub candidates: [PoseMessage; MAX_CANDIDATES],
     /// Best position of every joint of every candidate, in pixels of the frame. Used by the network method only.
     pub joints: [[[f32; 2]; MAX_JOINTS]; MAX_CANDIDATES],
@@ -101,8 +101,8 @@ pub struct ViewPose {
     /// Evidence in the picture for the direction in which the person of every candidate faces: `multiview::FrontEvidence`,
     /// `[towards the right of the picture, towards the camera]`. Zeros if there is no evidence.
     pub front: [[f32; 2]; MAX_CANDIDATES],
-    /// Confidence of the network in every joint of every candidate, from 0 to 1. It is 0 for a joint that is not seen, and always with
-    /// the paper's method.
+    /// Confidence of the network in every joint of every candidate, from 0 to 1. It is 0 for a joint that is not visible, and for all
+    /// joints with the paper's method.
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
     /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the network method only.
     pub colours: [[f32; 3]; MAX_CANDIDATES],
@@ -117,7 +117,7 @@ impl Default for ViewPose {
     }
 }
 
-/// The result of a pair of views under one assumption about facing.
+/// The result of a pair of views under one assumption about whether both see the person from the same side.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("PairHypothesis.v1")]
 #[repr(C)]
@@ -152,18 +152,19 @@ pub struct PairPose {
     pub stamp: Stamp,
     /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// States whether there is a hypothesis, and if not, why.
+    /// Whether there is a hypothesis and, if not, why.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,
     /// Indices of the two views, ascending.
     pub views: [u32; 2],
-    /// The hypothesis of same facing, then the hypothesis of opposite facing. There is only one if facing is not decided.
+    /// The hypothesis that both views see the person from the same side, then the one that they see opposite sides. The second exists only
+    /// if this must be decided.
     pub hypotheses: [PairHypothesis; 2],
     /// Bit `v` is set if the pose of view `v` arrived in time.
     pub views_present: u32,
-    /// Age of the expected errors of each of the two views, in frames, plus 1. The value 1 means this very frame; 0 means that
-    /// there are no expected errors, and every part counts as usable.
+    /// Age of the expected errors of each of the two views, in frames, plus 1. The value 1 means that they are of this frame; 0 means that
+    /// there are no expected errors, so that every part counts as usable.
     pub sigma_age: [u16; 2],
     /// Predicted distance of every part's centre from the truth in each of the two views, in pixels of the frame. It is valid for as many
     /// parts as the poses have, and only if `sigma_age` is not 0.

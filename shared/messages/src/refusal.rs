@@ -1,6 +1,6 @@
-//! Reasons why a receiver refuses a message.
+//! Reasons why a receiver rejects a message.
 
-/// Reason why a receiver refused a message: its sender is faulty, or does not belong to the deployment.
+/// Reason why a receiver rejected a message: its sender is faulty, or does not belong to the deployment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refusal {
     /// The message belongs to another session.

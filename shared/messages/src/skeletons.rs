@@ -19,7 +19,7 @@ pub struct Joint3d {
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
-    /// States whether there is a position, and if not, why.
+    /// Whether there is a position and, if not, why.
     pub status: Status,
 }
 
@@ -32,19 +32,19 @@ pub struct FusedView {
     pub energy: f64,
     /// Number of pairs that were averaged; 0 if the pose is the view's own, or if there is no pose.
     pub n_pairs: u32,
-    /// States whether there is a pose, and if not, why.
+    /// Whether there is a pose and, if not, why.
     pub status: Status,
     /// 1 if the view sees the person from behind, and left and right have been exchanged.
     pub exchanged: u32,
     /// Number of valid centres.
     pub n_parts: u32,
-    /// Centre of every anatomical part, in pixels of the frame.
+    /// Centre of every part, named by the person's left and right, in pixels of the frame.
     pub centres_px: [[f64; 2]; MAX_PARTS],
     /// Score of the view's best single-view candidate.
     pub single_score: f64,
 }
 
-/// Certainty of left and right of a skeleton. A transparent number, like [`Status`].
+/// How certain left and right of a skeleton are. A transparent number, like [`Status`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Sides.v1")]
 #[repr(C)]
@@ -53,9 +53,9 @@ pub struct Sides(pub u32);
 impl Sides {
     /// Left and right were not decided: they are named as they appear in the pictures.
     pub const AS_SEEN: Self = Self(0);
-    /// Left and right were decided with certainty.
+    /// Left and right were decided, and are certain.
     pub const SURE: Self = Self(1);
-    /// Left and right were decided on too little evidence.
+    /// Left and right were decided, but on too little evidence.
     pub const UNSURE: Self = Self(2);
 
     /// Returns the name for messages to users and for files.
@@ -98,8 +98,8 @@ impl Kept {
 #[type_name("SkeletonMessage.v1")]
 #[repr(C)]
 pub struct SkeletonMessage {
-    /// Person's identity within the run, counted from 1, as in [`PersonMessage::id`](crate::PersonMessage::id). Always 1 with the
-    /// paper's method, which does not identify people.
+    /// The person's id within the run, counted from 1, as in [`PersonMessage::id`](crate::PersonMessage::id). Always 1 with the paper's
+    /// method, which does not identify people.
     pub id: u64,
     /// [`Status::OK`] if the person has a skeleton, otherwise the reason why not.
     pub status: Status,
@@ -113,14 +113,14 @@ pub struct SkeletonMessage {
     pub views_used: u32,
     /// Number of pairs of views that contributed to the skeleton.
     pub n_pairs: u32,
-    /// Certainty of left and right, from the margin of the decision.
+    /// How certain left and right are, from the margin of the decision.
     pub sides: Sides,
     /// Poses from which the skeleton was triangulated.
     pub kept: Kept,
-    /// Certainty of which views see the person from the same side: energy of the chosen assignment
-    /// minus that of the best other assignment.
+    /// How certain it is which views see the person from the same side: energy of the chosen assignment minus that of the best other
+    /// assignment.
     pub facing_margin: f64,
-    /// Certainty that left and right are not exchanged in all views: log-odds, in nats.
+    /// How certain it is that left and right are not swapped in all views: log-odds, in nats.
     pub sides_margin: f64,
     /// Height of the person when standing upright, from the lengths of the bones, in metres; 0 if it is not known.
     pub stature_m: f64,
@@ -156,7 +156,7 @@ impl SkeletonMessage {
 
 /// The skeletons of one frame. The followed person comes first.
 ///
-/// The count is directly before the list, so that the used part is one block of memory. A recording has only this block.
+/// The count is stored directly before the list, so that the used part is one block of memory. Only this block is written to a recording.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
 #[type_name("Skeletons.v1")]
 #[repr(C)]
@@ -169,7 +169,7 @@ pub struct Skeletons {
     pub status: Status,
     /// Bit `v` is set if the result of view `v` arrived in time.
     pub views_present: u32,
-    /// Number of people that several views agree on, including people that are not in the list; 0 if they were not counted.
+    /// Number of people on whom several views agree, including people who are not in the list; 0 if they were not counted.
     pub n_seen: u32,
     /// Number of valid people.
     pub n_people: u32,

@@ -38,7 +38,7 @@ impl Status {
     pub const NO_FRAME: Self = Self(2);
     /// No pose scored above the threshold.
     pub const NO_DETECTION: Self = Self(3);
-    /// The predictor has no result for this frame.
+    /// There is no prediction of errors for this frame.
     pub const NO_PREDICTION: Self = Self(4);
     /// Too few views arrived in time.
     pub const TOO_FEW_VIEWS: Self = Self(5);

@@ -16,13 +16,13 @@ pub const MOST_PEOPLE: usize = 8;
 pub struct FrameLine {
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The people, the followed person first, with distinct identities. Empty in a line without a result.
+    /// The people, the followed person first, each with a different id. Empty in a line without a result.
     #[serde(deserialize_with = "people")]
     pub people: Vec<PersonLine>,
     /// Reason why there is no result; only in a line without a result.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Number of people that the views agree on, including people that are not in the list. `None` in a line without a result, and if the
+    /// Number of people on whom the views agree, including people who are not in the list. `None` in a line without a result, and if the
     /// model is not of people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<u32>,
@@ -47,23 +47,23 @@ pub struct PersonLine {
     /// not made.
     #[serde(deserialize_with = "nullable")]
     pub facing_margin: Option<f64>,
-    /// Person's identity within the run, counted from 1.
+    /// The person's id within the run, counted from 1.
     pub id: u64,
     /// The joints, by name.
     pub joints: BTreeMap<String, JointLine>,
     /// Poses from which the skeleton was made: the poses that fusion solved for, or those from which it started.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kept: Option<Kept>,
-    /// Extra keypoints of networks, which are not joints (face, feet, hands), by name. Each was triangulated alone. Empty without such
-    /// networks.
+    /// Extra keypoints of networks, which are not joints (face, feet, hands), by name. Each was triangulated separately. Empty if no
+    /// network finds such keypoints.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub keypoints: BTreeMap<String, JointLine>,
     /// Number of pairs of views that contributed to the skeleton.
     pub pairs: u32,
-    /// Certainty of left and right.
+    /// How certain left and right are.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides: Option<Sides>,
-    /// Log-odds that left and right are not exchanged in all views, in nats.
+    /// Log-odds that left and right are not swapped in all views, in nats.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sides_margin: Option<f64>,
     /// State of every joint and keypoint with a position: `measured`, `exchanged`, `filled` or `rejected`; only in
@@ -104,7 +104,7 @@ impl FrameLine {
     }
 }
 
-/// Reads at most as many people as fit. No two of them may share an identity.
+/// Reads the people, at most as many as are allowed. No two of them may have the same id.
 fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Error> {
     let people = Vec::<PersonLine>::deserialize(from)?;
     if people.len() > MOST_PEOPLE {
@@ -131,7 +131,7 @@ fn people<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<PersonLine>, D::Erro
     Ok(people)
 }
 
-/// Certainty of left and right of a skeleton.
+/// How certain left and right of a skeleton are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {
@@ -195,7 +195,7 @@ struct AnyJoint {
     status: Option<String>,
     covariance_m2: Option<Covariance>,
     position_m: Option<[f64; 3]>,
-    /// The field may be null, so a missing field is not detected.
+    /// The field may be null, so serde does not notice if it is missing.
     reprojection_px: Option<f64>,
     views: Option<Vec<String>>,
 }

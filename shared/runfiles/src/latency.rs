@@ -1,4 +1,4 @@
-//! `latency.json`: use of the time, from the stamps in the messages.
+//! `latency.json`: how the time of a run was used, computed from the stamps in the messages.
 
 use std::collections::BTreeMap;
 
@@ -23,12 +23,12 @@ pub struct Percentiles {
     pub p99_ms: f64,
 }
 
-/// Use of the time, over all frames.
+/// How the time was used, over all frames.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LatencyReport {
     /// Time from capture to the result.
     pub end_to_end: Percentiles,
-    /// Share of the end-to-end time that is not computation, on the path through the pipeline that took longest.
+    /// Fraction of the end-to-end time that is not computation, on the slowest path through the pipeline.
     #[serde(deserialize_with = "nullable")]
     pub share_not_computation: Option<f64>,
     /// Share of the end-to-end time that is transport.
@@ -39,7 +39,7 @@ pub struct LatencyReport {
     pub share_waiting: Option<f64>,
     /// Computing time of every stage.
     pub stages: BTreeMap<String, Percentiles>,
-    /// Time from sending to receiving if the receiver was free, which is the cost of the transport.
+    /// Time from sending to receiving while the receiver was not busy, which is the time that the transport takes.
     pub transport: BTreeMap<String, Percentiles>,
     /// Time from sending to receiving while the receiver was still busy with earlier work.
     pub waiting: BTreeMap<String, Percentiles>,

@@ -12,17 +12,17 @@ use crate::read::{parse, to_text};
 pub struct SmoothReport {
     /// Cutoff of the low-pass filter, in Hz, if there is one.
     pub cutoff_hz: Option<f64>,
-    /// Delay of the positions, in milliseconds; 0 for methods that look ahead.
+    /// Delay of the positions, in milliseconds; 0 for methods that also use later measurements.
     pub delay_ms: f64,
-    /// Reasons to doubt the result, in words; an empty list is good.
+    /// Reasons to doubt the result, in words; empty if there are none.
     pub doubts: Vec<String>,
-    /// Maximum time between measurements that was filled, in seconds.
+    /// Maximum time between measurements, in seconds, for the gap to be filled.
     pub fill_s: f64,
     /// Name of the method: `rts`, `butterworth`, `kalman` or `none`.
     pub method: String,
     /// Number of lines.
     pub n_frames: u64,
-    /// The people, by ascending identity. Each was smoothed alone.
+    /// The people, by ascending id. Each was smoothed separately.
     pub people: Vec<SmoothedPerson>,
     /// Frames per second: the inverse of the median time between two frames.
     pub rate_hz: Option<f64>,
@@ -39,23 +39,23 @@ pub struct SmoothedPerson {
     pub bones: BTreeMap<String, f64>,
     /// Frames at which another person begins. Nothing was smoothed across them.
     pub frames_of_breaks: Vec<u64>,
-    /// Identities within the run. There are several if no frame had two people and the followed person had several
-    /// identities, one after the other.
+    /// Ids of the person within the run. A person has several ids if no frame contains two people and the followed person had several ids
+    /// one after the other.
     pub ids: Vec<u64>,
     /// Smoothing of every joint and keypoint, by name.
     pub joints: BTreeMap<String, SmoothedJoint>,
-    /// Counts of frames whose left and right were not certain.
+    /// Counts of frames at which left and right were not certain.
     pub unsure: Unsure,
 }
 
-/// Counts of frames whose left and right were not certain, by their treatment.
+/// Counts of frames at which left and right were not certain, by what was done with them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Unsure {
-    /// Number of frames that were exchanged, because this fits the frames before and after.
+    /// Number of frames in which left and right were swapped, because this fits the frames before and after.
     pub exchanged: usize,
     /// Number of frames that were kept as measured.
     pub kept: usize,
-    /// Number of frames whose joints with a side were left out.
+    /// Number of frames whose left and right joints were left out.
     pub left_out: usize,
 }
 
@@ -64,9 +64,9 @@ pub struct Unsure {
 pub struct SmoothedJoint {
     /// Number of frames without a position.
     pub absent: usize,
-    /// Factor of the joint's covariances; `None` if the method does not estimate it.
+    /// Factor by which the joint's covariances must be multiplied; `None` if the method does not estimate it.
     pub covariance_scale: Option<f64>,
-    /// Number of frames in which the joint was measured under the name of the joint on the other side.
+    /// Number of frames in which the measurement named after the same joint on the other side was used.
     pub exchanged: usize,
     /// Number of frames that were filled.
     pub filled: usize,

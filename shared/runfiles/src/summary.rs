@@ -16,7 +16,7 @@ pub struct RunSummary {
     pub frame_rate_hz: Option<f64>,
     /// Name of the set of joints.
     pub joints: String,
-    /// Use of the time.
+    /// How the time was used.
     pub latency: LatencyReport,
     /// [`VERSION`] of all files of the run.
     pub schema_version: u64,
@@ -44,15 +44,14 @@ pub struct ViewSummary {
 /// Counts of detections and losses over the whole run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Summary {
-    /// Fit of every camera to the others, by name, since the last start of the process.
+    /// How well every camera agrees with the others, by name, since the last start of the process.
     pub calibration: BTreeMap<String, CameraFit>,
-    /// Cameras whose observations of one person contradict the rig, if the reason is unclear or is not an exchange.
+    /// Cameras whose observations of one person contradict the rig, for an unknown reason, or for one other than swapped footage.
     #[serde(deserialize_with = "nullable")]
     pub contradicted: Option<Contradicted>,
-    /// Size of the evidence that a view sent in shared memory, mean bytes per frame, by name, since the
-    /// last start of the process.
+    /// Mean size of the evidence that each view sent in shared memory, in bytes per frame, by name, since the last start of the process.
     pub evidence_bytes_per_frame: BTreeMap<String, u64>,
-    /// Two cameras that seem to have each other's footage.
+    /// Two cameras whose footage seems to be swapped.
     #[serde(deserialize_with = "nullable")]
     pub exchanged: Option<Exchanged>,
     /// Error of the first write that failed.
@@ -68,7 +67,7 @@ pub struct Summary {
     pub frames_not_recorded: u64,
     /// Number of results with a skeleton.
     pub frames_with_pose: u64,
-    /// Number of results that lack at least one view of the rig.
+    /// Number of results in which at least one view of the rig is missing.
     pub frames_with_views_missing: u64,
     /// The followed person and the other people in view, since the last start of the process.
     pub people: People,
@@ -81,7 +80,7 @@ pub struct Summary {
     /// Number of frames of every view that were searched in full, and number searched only near the last pose, by
     /// name, since the last start of the process.
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
-    /// Trust in the results, since the last start of the process.
+    /// How far the results can be trusted, since the last start of the process.
     pub trust: Trust,
     /// Number of results from which each view is missing, by name and reason.
     pub views_missing: BTreeMap<String, BTreeMap<Missing, u64>>,
@@ -100,7 +99,7 @@ pub struct People {
     pub each: Vec<PersonSummary>,
     /// Rule that selects the followed person: `last`, `largest` or `clearest`.
     pub follow: String,
-    /// Number of people that were followed, one after the other.
+    /// Number of different people who were followed, one after the other.
     pub followed: u64,
     /// Number of results with more than one person.
     pub frames_with_others: u64,
@@ -140,7 +139,7 @@ pub struct PersonSummary {
     pub first_frame: u64,
     /// Number of frames with a skeleton.
     pub frames: u64,
-    /// Person's identity within the run, counted from 1.
+    /// The person's id within the run, counted from 1.
     pub id: u64,
     /// Share of the joints that have a position, 0 to 1, over the frames with a skeleton.
     pub joints: f64,
@@ -149,11 +148,11 @@ pub struct PersonSummary {
     /// Root mean square reprojection error over all joints, in pixels of the frame.
     #[serde(deserialize_with = "nullable")]
     pub reprojection_px: Option<f64>,
-    /// Trust in the results of this person, since the last start of the process.
+    /// How far the results of this person can be trusted, since the last start of the process.
     pub trust: Trust,
 }
 
-/// Fit of a camera to the others, over the last frames.
+/// How well a camera agrees with the others, over the last frames.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CameraFit {
     /// Standard error of [`CameraFit::offset_ms`].
@@ -166,27 +165,27 @@ pub struct CameraFit {
     /// True if, at any time of the run, the camera seemed not to be synchronised with the others.
     #[serde(default)]
     pub out_of_step: bool,
-    /// Distance between the positions at which cameras see the same parts if this camera is one of them, in pixels of its footage. Unknown
-    /// with fewer than three cameras, and while too little was seen.
+    /// Distance between the positions at which this camera and the others see the same parts, in pixels of this camera's footage. Unknown
+    /// with fewer than three cameras, or while too little was seen.
     #[serde(deserialize_with = "nullable")]
     pub residual_px: Option<f64>,
     /// True if, at any time of the run, the camera seemed not to be at its calibrated position.
     pub suspected: bool,
-    /// [`CameraFit::residual_px`] of the other cameras without this one.
+    /// [`CameraFit::residual_px`] of the other cameras if this one is left out.
     #[serde(deserialize_with = "nullable")]
     pub without_px: Option<f64>,
 }
 
-/// Two cameras that seem to have each other's footage.
+/// Two cameras whose footage seems to be swapped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exchanged {
     /// Names of the two cameras.
     pub cameras: [String; 2],
     /// Median angle by which rays to the same part miss each other with the present footage, in degrees.
     pub degrees: f64,
-    /// Median angle by which the rays miss each other if the two cameras are exchanged, in degrees.
+    /// Median angle by which the rays miss each other if the footage of the two cameras is swapped, in degrees.
     pub exchanged_degrees: f64,
-    /// True if these two cameras are certain. In a ring of cameras, other pairs may fit almost as well.
+    /// True if it is certain that these are the two cameras. In a ring of cameras, other pairs may fit almost as well.
     pub sure: bool,
 }
 
@@ -195,10 +194,10 @@ pub struct Exchanged {
 pub struct Contradicted {
     /// Median angle by which rays to the same part miss each other, in degrees.
     pub degrees: f64,
-    /// The two cameras whose exchange fits best, if any exchange fits better.
+    /// The two cameras for which swapping the footage fits best, if any swap improves the fit.
     #[serde(deserialize_with = "nullable")]
     pub likely: Option<[String; 2]>,
-    /// Maximum usual angle, in degrees.
+    /// Maximum angle in a normal run, in degrees.
     pub usual_degrees: f64,
 }
 

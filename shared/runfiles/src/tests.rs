@@ -1,4 +1,4 @@
-//! Tests of reading and writing every file. The samples are of a run in which a camera's process was killed.
+//! Tests of reading and writing every file. The samples are from a run in which a camera's process was killed.
 
 use proptest::prelude::*;
 use serde::Serialize;
@@ -117,7 +117,7 @@ fn an_error_says_where_and_what_was_found() {
     assert!(error.contains("missing field `covariance_m2`"), "{error}");
 }
 
-/// Returns a line with people of these identities.
+/// Returns a line with people who have these ids.
 fn line_of(ids: &[u64]) -> String {
     let line = read::<FrameLine>(POSE3D).pop().unwrap();
     let person = |id: &u64| PersonLine {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::nullable::nullable;
 
-/// Measures of the quality of results, computed from the results alone. Shares are from 0 to 1.
+/// Measures of the quality of results, computed from the results alone. Fractions are from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Trust {
     /// Root mean square deviation of the bone lengths from the bone lengths of real people, in standard deviations; the median over the
@@ -17,7 +17,7 @@ pub struct Trust {
     /// standard deviation.
     #[serde(deserialize_with = "nullable")]
     pub bone_scatter_m: Option<f64>,
-    /// Mean distance of the views' observations from the joints in space, in metres, where each distance counts at most 0.3.
+    /// Mean distance of the views' observations from the 3D joints, in metres; each distance counts as at most 0.3.
     #[serde(deserialize_with = "nullable")]
     pub disagreement_m: Option<f64>,
     /// Number of results in which a person was found, with a plausible or an implausible body.
@@ -65,8 +65,8 @@ impl Kind {
         Self::Sides,
     ];
 
-    /// Returns the maximum tolerated value. The limits are chosen so that one person who is completely seen by calibrated cameras stays
-    /// below them: balancing and synthetic people reach at most two thirds of each limit.
+    /// Returns the maximum tolerated value. The limits are chosen so that they are not reached by one person who is completely visible to
+    /// calibrated cameras: in test data of real and synthetic people, the values are at most two thirds of each limit.
     fn limit(self) -> f64 {
         match self {
             Self::Reprojection => 0.1,
@@ -104,8 +104,8 @@ impl Trust {
     pub const MIN_FRAMES: u64 = 12;
 
     /// Returns a number that ranks runs by their error, in metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
-    /// [`bone_scatter_m`](Self::bone_scatter_m). It is not an error itself. A limit of 0.02 separates runs with many wrong limbs from other
-    /// runs (docs/guide/run.md).
+    /// [`bone_scatter_m`](Self::bone_scatter_m). The number is not an error itself. A limit of 0.02 m separates runs with many wrong limbs
+    /// from other runs (docs/guide/run.md).
     pub fn expected_error_m(&self) -> Option<f64> {
         Some((self.disagreement_m? * self.bone_scatter_m?).sqrt())
     }
@@ -151,7 +151,7 @@ impl Trust {
 }
 
 impl Doubt {
-    /// Returns true if it is the same reason, regardless of the numbers.
+    /// Returns true if both are the same reason, regardless of the numbers.
     pub fn is_like(&self, other: &Self) -> bool {
         self.kind == other.kind
     }

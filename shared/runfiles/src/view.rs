@@ -12,7 +12,7 @@ pub struct ViewLine {
     pub facing: Option<Facing>,
     /// Number of the frame in the footage.
     pub frame: u64,
-    /// The pose on which all views agreed. Parts have the side of the body.
+    /// The pose on which all views agreed. Left and right parts are named by the person's own sides.
     #[serde(deserialize_with = "nullable")]
     pub fused: Option<FusedPose>,
     /// Extent of the search in the frame (`full`, `tracked`); `None` if there was no pose.
@@ -24,7 +24,7 @@ pub struct ViewLine {
     /// Age of the expected errors that fusion used, in frames; `None` if fusion used none.
     #[serde(deserialize_with = "nullable")]
     pub sigma_used: Option<u16>,
-    /// The best pose of the view alone. Parts have the side of the image, as in the model.
+    /// The best pose of the view alone. Left and right parts are named by the sides of the image, as in the model.
     #[serde(deserialize_with = "nullable")]
     pub single: Option<SinglePose>,
     /// `ok`, or the reason why there is no pose of the view alone.
@@ -40,9 +40,9 @@ pub struct ViewLine {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", try_from = "String")]
 pub enum Facing {
-    /// Towards the camera: the sides of the body are named as in the model.
+    /// Towards the camera: left and right are named as in the model.
     Front,
-    /// Away from the camera: left and right were exchanged.
+    /// Away from the camera: left and right were swapped.
     Behind,
 }
 

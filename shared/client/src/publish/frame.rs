@@ -14,7 +14,7 @@ pub struct Frame<'a> {
     pub frame: u64,
     /// Time at which the frame was captured, in nanoseconds of `CLOCK_MONOTONIC`.
     pub captured_at_nanos: u64,
-    /// Person's identity within the run, counted from 1; 0 in a frame without people.
+    /// The person's id within the run, counted from 1; 0 in a frame without people.
     pub person: u64,
     /// Number of people of this frame that are sent.
     pub n_people: u32,
@@ -22,7 +22,7 @@ pub struct Frame<'a> {
     pub status: &'a str,
     /// Decision on left and right, in words.
     pub sides: &'a str,
-    /// Number of people that several views agree on; 0 if they were not counted.
+    /// Number of people on whom several views agree; 0 if they were not counted.
     pub n_seen: u32,
     /// Number of frames that are missing before this one.
     pub n_missed: u64,

@@ -79,7 +79,8 @@ fn written(trial: &Trial) -> (String, Notes) {
     (String::from_utf8(bytes).unwrap(), notes)
 }
 
-/// Returns the maximum distance of a joint from its measured position: the sum of the changes of length between the hips and the joint.
+/// Returns the maximum distance of a joint from its measured position: the sum of the length changes of the bones between the hips and the
+/// joint.
 fn bound(trial: &Trial, slot: usize, node: usize) -> f64 {
     let (lengths, landmarks) = (lengths(trial), Landmarks::of(trial));
     let place = |node: usize| landmarks.at(trial, slot, NODES[node].landmark.unwrap());

@@ -1,5 +1,5 @@
-//! The clocks of cameras as one HTML page: the result, the reasons for or against trusting it, and for every pair of cameras a curve of the
-//! cost against the offset.
+//! The synchronisation of cameras as one HTML page: the result, the reasons for or against trusting it, and for every pair of cameras a
+//! curve of the matching cost against the time offset.
 
 use core::fmt::Write as _;
 
@@ -21,7 +21,7 @@ pub struct Page<'a> {
     pub names: &'a [&'a str],
     /// Outcome of the synchronisation.
     pub outcome: &'a Outcome,
-    /// True if sounds were compared instead of joints.
+    /// True if sounds were compared instead of joint motion.
     pub is_heard: bool,
     /// Description of the input: key and value.
     pub about: &'a [(String, String)],
@@ -124,7 +124,7 @@ fn pair_plot(out: &mut Html, names: &[&str], curve: &Curve, pair: &PairReport) {
     put!(out, "</svg>\n");
 }
 
-/// Draws the offsets of a pair: the one that follows from all cameras together, the pair's best one, and its second best one.
+/// Draws the offsets of a pair: the one computed from all cameras together, the best one of the pair alone, and the second best one.
 fn marks(out: &mut Html, pair: &PairReport, x: impl Fn(f64) -> f64) {
     let bottom = TOP + HEIGHT;
     for (offset_s, style) in [

@@ -53,7 +53,7 @@ impl Html {
 #[macro_export]
 macro_rules! put {
     ($out:expr, $markup:literal, [$($name:ident),+] $(, $value:expr)* $(,)?) => {
-        // With `concat!`, braces cannot take variables that are not listed, which would otherwise be written unwrapped.
+        // With `concat!`, braces cannot use variables that are not listed, which would otherwise be written without escaping.
         $out.put_wrapped(format_args!(
             concat!($markup)
             $(, $crate::report::html::Put(&$value))*

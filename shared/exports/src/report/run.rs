@@ -1,4 +1,4 @@
-//! A run as one HTML page: limits and whether they were met, the skeleton in space, the presence of views over time, tables, pictures.
+//! A run as one HTML page: limits and whether they were met, the skeleton in 3D, which views contributed over time, tables, pictures.
 //!
 //! The policy of the page forbids every request. Two short scripts (`stage.js`, `space.js`) draw the skeleton on a canvas, which can be
 //! dragged to rotate it, played, paused and stepped.

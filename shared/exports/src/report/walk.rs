@@ -13,9 +13,9 @@ use crate::report::run::{Eye, Moment, SCRIPT, Space};
 /// Number of cells of a picture along each axis, and the size of its drawing.
 const CELLS: usize = 8;
 const WIDTH: f64 = 160.0;
-/// Words for a rig with doubts.
+/// Text for a rig with doubts.
 const UNUSABLE: &str = "not to be used";
-/// Words for a rig with cautions.
+/// Text for a rig with cautions.
 const ROUGH: &str = "usable, but not known well";
 /// Legend of the drawings in pictures.
 const DRAWN: &str = "Each ring is a detected joint; the line leads to the position that the rig predicts from the detections of all \

@@ -1,4 +1,4 @@
-//! Tests of places on the grid, of gaps, and of refused input.
+//! Tests of instants on the grid, of gaps, and of rejected input.
 
 use super::*;
 use crate::testing::{line, walker};

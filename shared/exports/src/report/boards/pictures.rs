@@ -8,7 +8,7 @@ use crate::report::html::{Html, html, put};
 const WIDTH: f64 = 420.0;
 /// Factor by which residuals are enlarged in the drawing.
 const LONGER: f64 = 25.0;
-/// Side of the plot of residuals, and the length of one pixel in the plot.
+/// Side of the plot of residuals; the next constant is the length of one pixel in the plot.
 const PLOT: f64 = 180.0;
 const PIXEL: f64 = 40.0;
 /// Maximum number of corners that are drawn.

@@ -14,7 +14,7 @@ pub struct Space {
     pub limbs: Vec<(usize, usize)>,
     /// The cameras, in the order of [`Moment::views`].
     pub eyes: Vec<Eye>,
-    /// Direction against gravity.
+    /// Upward direction.
     pub up: Point,
     /// The results, in the order of time.
     pub moments: Vec<Moment>,

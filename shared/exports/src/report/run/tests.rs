@@ -215,8 +215,8 @@ fn no_text_of_the_page_becomes_markup() {
     let html = html(&page);
     // The two scripts are the data and the script of the page itself.
     assert_eq!(html.matches("<script").count(), 2);
-    // The count is: the title twice, lead, legend, 2 limits of 3, 2 cameras, a view's absence, a mark, 6 of the table, the strip, and
-    // its pictures: one with a name, and one with a name and the reason for its absence.
+    // The expected count consists of: the title twice, lead, legend, 2 limits of 3, 2 cameras, a view's absence, a mark, 6 of the table,
+    // the strip, and its pictures: one with a name, and one with a name and the reason for its absence.
     let escaped = html.matches("&lt;script&gt;&#39;&quot;&amp;").count();
     assert_eq!(escaped, 2 + 2 + 6 + 2 + 1 + 1 + 6 + 1 + 3);
 }
