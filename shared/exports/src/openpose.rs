@@ -51,7 +51,7 @@ fn person(trial: &Trial, id: Option<u64>, slot: usize, view: &ViewCamera) -> Opt
     is_any.then_some(person)
 }
 
-/// Returns a keypoint in the picture, and the share of the views from which it was triangulated.
+/// Returns a keypoint in the picture, and the fraction of the views from which it was triangulated.
 fn keypoint(
     trial: &Trial,
     slot: usize,

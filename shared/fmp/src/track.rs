@@ -25,7 +25,7 @@ impl From<u64> for FrameTime {
 pub struct TrackSettings {
     /// Number of levels that are searched on each side of the last pose's level.
     pub levels: u16,
-    /// Search distance around the last pose's box, as a share of the box's longer side.
+    /// Search distance around the last pose's box, as a fraction of the box's longer side.
     pub margin: f64,
     /// Interval between full searches, in frames; 0 and 1 mean a full search in every frame.
     pub full_every: u64,
@@ -33,7 +33,7 @@ pub struct TrackSettings {
     pub max_gap: u64,
     /// Maximum drop of the score below that of the last full search. If the score drops further, the same frame is searched again in full.
     pub max_drop: f32,
-    /// Maximum movement of a pose per second, as a share of its box's longer side; at low frame rates, the resulting distance exceeds
+    /// Maximum movement of a pose per second, as a fraction of its box's longer side; at low frame rates, the resulting distance exceeds
     /// `margin`.
     pub speed: f64,
     /// Maximum time between frames across which a pose is tracked, in seconds.

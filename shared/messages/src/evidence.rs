@@ -35,7 +35,7 @@ pub struct EvidenceHeader {
     pub width: u32,
     /// Height of the image, in pixels.
     pub height: u32,
-    /// Whether there is evidence and, if not, why.
+    /// States whether there is evidence and, if not, why.
     pub status: Status,
     /// Number of valid entries of `levels`.
     pub n_levels: u32,

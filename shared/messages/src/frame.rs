@@ -22,7 +22,7 @@ pub struct FrameHeader {
     pub width: u32,
     /// Height, in pixels; 0 if there is no image.
     pub height: u32,
-    /// Whether there is an image and, if not, why.
+    /// States whether there is an image and, if not, why.
     pub status: Status,
     /// Explicit padding.
     pub reserved: u32,

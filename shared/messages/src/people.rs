@@ -30,7 +30,7 @@ pub struct People {
     pub stamp: Stamp,
     /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// Whether there is at least one person and, if not, why.
+    /// States whether there is at least one person and, if not, why.
     pub status: Status,
     /// Number of valid people.
     pub n_people: u32,

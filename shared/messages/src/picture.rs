@@ -25,7 +25,7 @@ pub struct PictureHeader {
     pub width: u32,
     /// Height, in pixels.
     pub height: u32,
-    /// Whether there is a picture and, if not, why: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
+    /// States whether there is a picture and, if not, why: [`Status::OK`], [`Status::DAMAGED`] or [`Status::END`].
     pub status: Status,
     /// Format of the bytes, four letters.
     ///

@@ -75,7 +75,7 @@ pub struct ViewPose {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Whether there is a candidate and, if not, why.
+    /// States whether there is a candidate and, if not, why.
     pub status: Status,
     /// Number of valid candidates.
     pub n_candidates: u32,
@@ -128,7 +128,7 @@ pub struct PairHypothesis {
     pub n_iterations: u32,
     /// 1 if the poses had converged at the end, 0 if the limit of iterations was reached.
     pub converged: u32,
-    /// 1 if left and right of the second view are exchanged relative to the first view.
+    /// 1 if left and right of the second view are swapped relative to the first view.
     pub exchanged: u32,
     /// The candidate of each view from which the pair started.
     pub start: [u8; 2],
@@ -152,7 +152,7 @@ pub struct PairPose {
     pub stamp: Stamp,
     /// Times at which the last input arrived and the message was sent.
     pub timing: Timing,
-    /// Whether there is a hypothesis and, if not, why.
+    /// States whether there is a hypothesis and, if not, why.
     pub status: Status,
     /// Number of valid hypotheses.
     pub n_hypotheses: u32,

@@ -14,7 +14,7 @@ pub struct ViewQuality {
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
     pub timing: Timing,
-    /// Whether there is a prediction and, if not, why. Without a prediction, fusion treats every part as usable.
+    /// States whether there is a prediction and, if not, why. Without a prediction, fusion treats every part as usable.
     pub status: Status,
     /// Number of valid parts.
     pub n_parts: u32,

@@ -19,7 +19,7 @@ pub struct Joint3d {
     pub reprojection_px: f64,
     /// Bit `v` is set if view `v` was used.
     pub views_used: u32,
-    /// Whether there is a position and, if not, why.
+    /// States whether there is a position and, if not, why.
     pub status: Status,
 }
 
@@ -32,9 +32,9 @@ pub struct FusedView {
     pub energy: f64,
     /// Number of pairs that were averaged; 0 if the pose is the view's own, or if there is no pose.
     pub n_pairs: u32,
-    /// Whether there is a pose and, if not, why.
+    /// States whether there is a pose and, if not, why.
     pub status: Status,
-    /// 1 if the view sees the person from behind, and left and right have been exchanged.
+    /// 1 if the view sees the person from behind, and left and right have been swapped.
     pub exchanged: u32,
     /// Number of valid centres.
     pub n_parts: u32,

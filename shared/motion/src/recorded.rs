@@ -48,7 +48,7 @@ impl Joint {
 pub struct Recorded {
     /// The instants, in seconds, in ascending order.
     pub times: Vec<f64>,
-    /// Whether left and right are certain, at every instant.
+    /// States whether left and right are certain, at every instant.
     pub sides: Vec<Sides>,
     /// The joints of the person.
     pub joints: Vec<Joint>,

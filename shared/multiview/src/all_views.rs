@@ -26,7 +26,7 @@ pub struct AllViewsInput<'a> {
 pub struct AllViewsStart<'a> {
     /// Candidate of every view.
     pub candidates: &'a [usize],
-    /// For every view, true if its left and right are exchanged relative to the first view.
+    /// For every view, true if its left and right are swapped relative to the first view.
     pub exchanged: &'a [bool],
 }
 

@@ -23,7 +23,7 @@ const HEAD: usize = 13;
 /// Returns the evidence that left and right of a skeleton are labelled correctly, in trunk lengths.
 ///
 /// The evidence is the sum of these distances: the head in front of the neck, the knees in front of the line from hip to ankle, the elbows
-/// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Exchanging left and right
+/// behind the line from shoulder to wrist and, if the up direction is known, the neck in front of the pelvis. Swapping left and right
 /// negates it exactly. The paper does not answer this question; the rule is our own.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14` in the world; a missing joint contributes 0.

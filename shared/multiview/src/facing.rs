@@ -12,7 +12,7 @@ pub struct PairEnergies {
 /// Maximum number of views for which all assignments are enumerated.
 const MAX_VIEWS: usize = 16;
 
-/// A bit set of views: bit `v` is set if left and right of view `v` are exchanged.
+/// A bit set of views: bit `v` is set if left and right of view `v` are swapped.
 pub type Exchanges = u32;
 
 /// Ranks the possible assignments of swapped views by the sum of the pairs' energies.
@@ -57,7 +57,7 @@ pub fn rank_facing(
     ranked
 }
 
-/// Returns true if a view is exchanged.
+/// Returns true if a view is swapped.
 pub fn is_exchanged(exchanges: Exchanges, view: usize) -> bool {
     exchanges >> view & 1 == 1
 }

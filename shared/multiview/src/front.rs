@@ -19,8 +19,8 @@ pub type FrontEvidence = [f32; 2];
 
 /// Returns the direction in which a labelled skeleton faces, as a unit vector in the frame of its joints.
 ///
-/// It is `l x u` with `l` from the skeleton's right to its left and `u` from its pelvis to its neck. If left and right are
-/// exchanged, it is the opposite direction.
+/// It is `l x u` with `l` from the skeleton's right to its left and `u` from its pelvis to its neck. If left and right are swapped, it is
+/// the opposite direction.
 ///
 /// * `joints`: the 14 joints of `skeleton::PARSE14`.
 /// * Returns `None` without a trunk, or if both the shoulders and the hips are incomplete.

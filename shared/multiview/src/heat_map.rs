@@ -37,7 +37,7 @@ pub fn heat_map(ends: [[f64; 2]; 2], image_size: [usize; 2], rows: usize, cols: 
     map
 }
 
-/// Returns the share of every cell that the line covers.
+/// Returns the fraction of every cell that the line covers.
 fn coverage(ends: [[f64; 2]; 2], size: [usize; 2], rows: usize, cols: usize) -> Vec<f64> {
     let [width, height] = size;
     let cell = [width as f64 / cols as f64, height as f64 / rows as f64];

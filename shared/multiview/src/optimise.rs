@@ -11,7 +11,7 @@ use crate::{EnergyKind, PairInput, Settings, ViewPlan};
 pub struct PairStart {
     /// Candidate of each view.
     pub candidates: [usize; 2],
-    /// True if left and right of the second view are exchanged relative to the first.
+    /// True if left and right of the second view are swapped relative to the first.
     pub exchanged: bool,
 }
 
@@ -48,7 +48,7 @@ pub struct PairEstimate {
 
 /// Maximises the joint energy of a pair from a given start.
 ///
-/// Eq. 3 of the paper is maximised by solving one view exactly while the other view (the support) is fixed, then exchanging roles (section
+/// Eq. 3 of the paper is maximised by solving one view exactly while the other view (the support) is fixed, then swapping roles (section
 /// 6). The first support is the view whose expected errors have the smaller sum over its parts. If a view has no expected errors, it is the
 /// view with the higher score.
 ///

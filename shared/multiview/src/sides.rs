@@ -33,7 +33,7 @@ impl Default for SidesSettings {
 /// The decision for one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sides {
-    /// True if left and right must be exchanged in all views.
+    /// True if left and right must be swapped in all views.
     pub exchange: bool,
     /// Log-odds of the decision, in nats; not negative.
     pub margin: f64,
@@ -56,7 +56,7 @@ impl SidesFilter {
     ///
     /// * `front`: direction in which the skeleton faces according to its labels, as a unit vector; `None` if
     ///   unknown.
-    /// * `evidence`: log-likelihood ratio of the labels over the exchanged labels, from this frame alone, in nats.
+    /// * `evidence`: log-likelihood ratio of the labels over the swapped labels, from this frame alone, in nats.
     pub fn decide(
         &mut self,
         settings: &SidesSettings,

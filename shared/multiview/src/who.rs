@@ -8,7 +8,7 @@ use nalgebra::Point2;
 pub struct SeenPerson {
     /// The 14 joints of `skeleton::PARSE14`, each with its position in pixels of the picture and the confidence of the network, 0 to 1.
     pub joints: Vec<Option<([f64; 2], f64)>>,
-    /// Height of the box, as a share of the height of the picture.
+    /// Height of the box, as a fraction of the height of the picture.
     pub height: f64,
 }
 

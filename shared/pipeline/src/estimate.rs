@@ -212,7 +212,7 @@ fn search(
 pub struct EstimatorSettings {
     /// Settings of the single-view step.
     pub view: ViewSettings,
-    /// Whether views are solved in pairs or all at once.
+    /// States whether views are solved in pairs or all at once.
     pub views: Views,
     /// The person to follow if there are several.
     pub follow: Follow,

@@ -82,7 +82,7 @@ pub struct AllViewsResult {
 /// The result of all views at once under one assumption about which views see the person from behind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AllViewsHypothesis {
-    /// For each view, true if its left and right are assumed to be exchanged relative to the first view.
+    /// For each view, true if its left and right are assumed to be swapped relative to the first view.
     pub exchanged: Vec<bool>,
     /// The candidate of each view from which the solution started.
     pub candidates: Vec<usize>,

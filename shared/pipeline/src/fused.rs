@@ -96,7 +96,7 @@ fn of_facing(result: &AllViewsResult, exchanged: Exchanges) -> Option<&AllViewsH
     chosen.or_else(|| result.hypotheses.first())
 }
 
-/// Returns the views that a hypothesis assumes to be exchanged relative to the first view.
+/// Returns the views that a hypothesis assumes to be swapped relative to the first view.
 fn exchanges(result: &AllViewsResult, hypothesis: &AllViewsHypothesis) -> Exchanges {
     let each = result.views.iter().zip(&hypothesis.exchanged);
     each.fold(0, |mask, (view, exchanged)| {

@@ -14,7 +14,8 @@ const SAME_BOX: f64 = 0.85;
 const BEHIND: f64 = 0.2;
 /// Minimum number of joints that must remain visible for a person who is behind others.
 const LEAST_BEHIND: usize = 7;
-/// Minimum heat of a new person, as a share of the heat of the best person in the frame; a fainter detection is often a chair or a poster.
+/// Minimum heat of a new person, as a fraction of the heat of the best person in the frame; a fainter detection is often a chair or a
+/// poster.
 const FAINT: f64 = 0.7;
 /// Minimum heat (0 to 1) at which a joint is used to compute the person's position.
 const SURE: f64 = 0.2;

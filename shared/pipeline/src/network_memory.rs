@@ -248,8 +248,8 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
-/// Returns the displacement of a whole person from one sighting to another, as a share of the height of the first window. It is the median
-/// over the joints along each axis, so that errors of single joints have little effect.
+/// Returns the displacement of a whole person from one sighting to another, as a fraction of the height of the first window. It is the
+/// median over the joints along each axis, so that errors of single joints have little effect.
 pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
     let [_, top, _, bottom] = first.extent();
     let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));

@@ -45,7 +45,7 @@ pub struct NetworkSettings {
     pub least_heat: f64,
     /// Settings that control how maps are turned into evidence.
     pub maps: MapSettings,
-    /// Standard deviation of keypoints found by another program, as a share of the height of the person's box enlarged by a quarter.
+    /// Standard deviation of keypoints found by another program, as a fraction of the height of the person's box enlarged by a quarter.
     pub keypoint_sigma: f64,
 }
 

@@ -17,9 +17,9 @@ const HIPS: usize = 2;
 /// between two knees may be anywhere between the legs.
 const LENGTHS: [[f64; 2]; N_POINTS - 1] = [[0.05, 0.5], [0.2, 0.8], [0.0, 0.7], [0.0, 0.7]];
 
-/// Maximum mean distance of a candidate's points from the projected person, as a share of the candidate's size in the picture.
+/// Maximum mean distance of a candidate's points from the projected person, as a fraction of the candidate's size in the picture.
 const TOLERANCE: f64 = 0.15;
-/// A candidate shows a person if its trunk is nearer to the person's midline than this share of the candidate's size.
+/// A candidate shows a person if its trunk is nearer to the person's midline than this fraction of the candidate's size.
 const SAME: f64 = 0.15;
 /// Distance between two trunks below which they belong to the same person, in metres.
 const APART_M: f64 = 0.5;
@@ -31,7 +31,7 @@ const MAX_ROUNDS: usize = 3;
 const MIN_SPREAD: f64 = 0.002;
 /// Minimum number of views that must agree on a person; in a smaller rig, all views must agree.
 const MIN_VIEWS: usize = 3;
-/// Minimum strength of a person, as a share of the strength of the strongest person.
+/// Minimum strength of a person, as a fraction of the strength of the strongest person.
 const MIN_STRENGTH: f64 = 0.28;
 
 /// A person that several views may show.

@@ -9,7 +9,7 @@ use crate::sighting::Sighting;
 
 /// Maximum number of candidate positions that a view offers for a joint.
 const N_MAXIMA: usize = 3;
-/// Margin around the box of the joints within which the person is searched for, as a share of the box's longer side.
+/// Margin around the box of the joints within which the person is searched for, as a fraction of the box's longer side.
 const BEYOND: f64 = 0.3;
 
 /// The maps of a view near one person, as evidence for joints.

@@ -71,7 +71,7 @@ impl Sighting {
 
     /// Returns the positions of the joints, in pixels of the frame; NaN for a joint that is not seen.
     ///
-    /// * `is_exchanged`: true to exchange left and right.
+    /// * `is_exchanged`: true to swap left and right.
     pub fn places(&self, is_exchanged: bool) -> [[f64; 2]; N] {
         let mut places = core::array::from_fn(|joint| self.joint(joint).unwrap_or([f64::NAN; 2]));
         if is_exchanged {

@@ -14,7 +14,7 @@ const WIDER: f64 = 0.25;
 /// for one maximum gap between frames (0.4 s), in which a running person moves by half of the body height.
 const MOVED: f64 = 0.5;
 const MOST_MOVED: f64 = 1.0;
-/// Maximum displacement of a person who stands still, as a share of the height of the network's window; less than the error
+/// Maximum displacement of a person who stands still, as a fraction of the height of the network's window; less than the error
 /// of the network.
 const STILL: f64 = 0.01;
 /// If a person's last step exceeds this multiple of [`STILL`], the person has moved, whatever the mean velocity.
@@ -134,7 +134,7 @@ pub(crate) fn moved(outline: [f64; 4], apart: f64) -> [f64; 4] {
     enlarged(outline, (MOVED * apart).min(MOST_MOVED))
 }
 
-/// Enlarges a box on all sides by a share of its longer side.
+/// Enlarges a box on all sides by a fraction of its longer side.
 fn enlarged([left, top, right, bottom]: [f64; 4], share: f64) -> [f64; 4] {
     let more = share * (right - left).max(bottom - top);
     [left - more, top - more, right + more, bottom + more]

@@ -137,7 +137,7 @@ pub struct Envelope {
     pub stamp: Stamp,
     /// Times of the message.
     pub timing: Timing,
-    /// Whether the message contains a result and, if not, why.
+    /// States whether the message contains a result and, if not, why.
     pub status: Status,
 }
 

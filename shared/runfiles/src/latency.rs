@@ -31,10 +31,10 @@ pub struct LatencyReport {
     /// Fraction of the end-to-end time that is not computation, on the slowest path through the pipeline.
     #[serde(deserialize_with = "nullable")]
     pub share_not_computation: Option<f64>,
-    /// Share of the end-to-end time that is transport.
+    /// Fraction of the end-to-end time that is transport.
     #[serde(deserialize_with = "nullable")]
     pub share_transport: Option<f64>,
-    /// Share of the end-to-end time spent waiting for busy processes.
+    /// Fraction of the end-to-end time spent waiting for busy processes.
     #[serde(deserialize_with = "nullable")]
     pub share_waiting: Option<f64>,
     /// Computing time of every stage.

@@ -141,7 +141,7 @@ pub struct PersonSummary {
     pub frames: u64,
     /// The person's id within the run, counted from 1.
     pub id: u64,
-    /// Share of the joints that have a position, 0 to 1, over the frames with a skeleton.
+    /// Fraction of the joints that have a position, 0 to 1, over the frames with a skeleton.
     pub joints: f64,
     /// Last frame with a skeleton.
     pub last_frame: u64,

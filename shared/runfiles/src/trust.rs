@@ -22,17 +22,18 @@ pub struct Trust {
     pub disagreement_m: Option<f64>,
     /// Number of results in which a person was found, with a plausible or an implausible body.
     pub frames: u64,
-    /// Share of these results whose body is implausible for a person.
+    /// Fraction of these results whose body is implausible for a person.
     pub implausible: f64,
-    /// Share of the joints of the skeletons that were left out, because their positions are impossible for a human body.
+    /// Fraction of the joints of the skeletons that were left out, because their positions are impossible for a human body.
     pub joints_implausible: f64,
-    /// Share of the results in which the middle of the body is farther from the middle in the previous result than a person can have moved.
+    /// Fraction of the results in which the middle of the body is farther from the middle in the previous result than a person can have
+    /// moved.
     pub jumps: f64,
-    /// Distance of the joints' reprojections from the views' observations, as a share of the person's height in the frames: root
+    /// Distance of the joints' reprojections from the views' observations, as a fraction of the person's height in the frames: root
     /// mean square over all joints.
     #[serde(deserialize_with = "nullable")]
     pub reprojection: Option<f64>,
-    /// Share of the skeletons whose left and right are not certain.
+    /// Fraction of the skeletons whose left and right are not certain.
     pub sides_unsure: f64,
 }
 

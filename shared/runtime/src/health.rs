@@ -152,7 +152,7 @@ impl Health {
         }
     }
 
-    /// Counts a refused message. Logs the reason for the first message of every cause, and then each time the count has doubled.
+    /// Counts a rejected message. Logs the reason for the first message of every cause, and then each time the count has doubled.
     pub fn refuse(&self, cause: Refusal, topic: &str, why: &dyn core::fmt::Display) {
         self.dropped(Cause::Malformed, 1);
         let n = 1 + self.counts.refused[cause as usize].fetch_add(1, Ordering::Relaxed);

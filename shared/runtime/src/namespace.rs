@@ -178,7 +178,7 @@ impl Namespace {
     ///
     /// # Errors
     ///
-    /// Returns [`NamespaceError::Root`] if iceoryx2 refuses the path.
+    /// Returns [`NamespaceError::Root`] if iceoryx2 rejects the path.
     pub(crate) fn config(&self) -> Result<Config, NamespaceError> {
         let refused = || NamespaceError::Root {
             root: self.root.clone(),

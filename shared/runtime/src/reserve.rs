@@ -22,9 +22,9 @@ use rustix::io::Errno;
 /// The magic number of tmpfs (statfs(2)).
 const TMPFS_MAGIC: u64 = 0x0102_1994;
 
-/// Last size that was refused, in bytes; 0 if none was refused.
+/// Last size that was rejected, in bytes; 0 if none was rejected.
 static REFUSED: AtomicU64 = AtomicU64::new(0);
-/// Number of refused sizes.
+/// Number of rejected sizes.
 static N_REFUSED: AtomicU64 = AtomicU64::new(0);
 /// True if a segment exceeded the limit on the size of a file.
 static IS_LIMITED: AtomicBool = AtomicBool::new(false);
@@ -50,7 +50,7 @@ pub(crate) fn refused() -> Option<Refused> {
     }
 }
 
-/// Returns the number of refused sizes in this process.
+/// Returns the number of rejected sizes in this process.
 pub(crate) fn n_refused() -> u64 {
     N_REFUSED.load(Ordering::Relaxed)
 }

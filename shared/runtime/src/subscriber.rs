@@ -201,7 +201,7 @@ impl<E: Element, H: Header> Sample<E, H> {
 
 /// Returns the name of every subscriber that senders do not wait for ([`Bus::as_onlooker`]).
 pub(crate) fn onlooker() -> PortName {
-    // The name is short and plain, so it cannot be refused.
+    // The name is short and plain, so it is always accepted.
     PortName::new("onlooker").unwrap_or_else(|_| PortName::new_empty())
 }
 

@@ -1,4 +1,4 @@
-//! Reasons why a message was refused.
+//! Reasons why a message was rejected.
 
 use messages::Refusal;
 

@@ -56,7 +56,7 @@ pub fn encode(model: &Model) -> Result<Vec<u8>, OwnError> {
 ///
 /// # Errors
 ///
-/// [`OwnError`]; truncated files and files with a changed byte are always refused.
+/// [`OwnError`]; truncated files and files with a changed byte are always rejected.
 pub fn decode(bytes: &[u8]) -> Result<ModelSpec, OwnError> {
     let payload = ENVELOPE.open(bytes)?;
     let (spec, n_read) =

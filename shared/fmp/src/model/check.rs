@@ -158,7 +158,7 @@ fn check_filter(whose: impl Fn() -> String + Copy, filter: &Filter) -> Result<()
     filter.weights.iter().try_for_each(|&weight| number("weight", whose, weight))
 }
 
-/// Checks that `mirror` exchanges parts in pairs and preserves the tree.
+/// Checks that `mirror` swaps parts in pairs and preserves the tree.
 fn check_mirror(parts: &[PartSpec], mirror: &[usize]) -> Result<(), ModelError> {
     size(
         "mirror",

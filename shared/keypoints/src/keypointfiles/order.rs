@@ -7,9 +7,9 @@
 use crate::BODY_25;
 use crate::files::SeenKeypoints;
 
-/// Maximum distance of the pelvis from the middle of the hips, as a share of the longer side of a person's box. If the distance is larger
-/// in half of the people, the point is not the pelvis. In the demonstration of Pose2Sim, which uses `body-25b`, the median for each camera
-/// is 0.17 to 0.51.
+/// Maximum distance of the pelvis from the middle of the hips, as a fraction of the longer side of a person's box. If the distance is
+/// larger in half of the people, the point is not the pelvis. In the demonstration of Pose2Sim, which uses `body-25b`, the median for each
+/// camera is 0.17 to 0.51.
 const MOST_OFF: f64 = 0.1;
 
 /// Returns the median distance of the pelvis from the middle of the hips. Returns `None` if it is small enough, or if no person

@@ -11,7 +11,7 @@ const SETTINGS: Local = Local {
     reach: 2,
     ridge: 1e-4,
 };
-/// Distance of an annotated knee beyond its part, as a share of the distance between the thigh part and the knee part.
+/// Distance of an annotated knee beyond its part, as a fraction of the distance between the thigh part and the knee part.
 const BEYOND: f64 = 0.25;
 
 /// Returns a person in a random pose whose knees are beyond their parts, away from the thigh.

@@ -54,7 +54,7 @@ pub struct Tally {
 impl Tally {
     /// Counts one frame.
     ///
-    /// * `segments`: errors of the segments as shares of their length; `None` for a segment that was not found.
+    /// * `segments`: errors of the segments as fractions of their length; `None` for a segment that was not found.
     /// * `iterations`: number of iterations of every pair.
     pub fn add(&mut self, segments: &[Option<f64>], iterations: &[u32]) {
         for error in segments {

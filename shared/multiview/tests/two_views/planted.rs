@@ -16,7 +16,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 pub(crate) const N_PARTS: usize = 3;
 pub(crate) const N_TYPES: usize = 2;
-/// Mirror image of the parts: the arms exchange sides.
+/// Mirror image of the parts: the left and the right arm are swapped.
 pub(crate) const MIRROR: [usize; N_PARTS] = [0, 2, 1];
 
 /// A deterministic generator of pseudorandom numbers.

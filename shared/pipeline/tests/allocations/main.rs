@@ -3,8 +3,8 @@
 //! The goal of no allocations is not reached. But no allocation is as large as a response map: a frame with four times as many cells
 //! allocates no more than a small one. The remaining allocations are the results (the poses of every solution, the joints) and short lists
 //! per frame with one entry per view, part, candidate or level. In `triangulate`, each list occurs once for each of the eight assumptions
-//! about facing of four views. The limits are the measured counts, rounded up. They should be lowered when a list is removed. They apply to
-//! test builds, with their additional checks.
+//! about which of four views see the person from behind. The limits are the measured counts, rounded up. They should be lowered when a list
+//! is removed. They apply to test builds, with their additional checks.
 //!
 //! This test runs without the test harness, because the harness's threads allocate memory too. Everything runs on one thread.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]

@@ -22,7 +22,8 @@ const SIDES_DIFFER: f64 = 0.02;
 /// be accepted.
 const STATURE_SPREAD: f64 = 0.08;
 
-/// Standard deviation of a reach, as a share of the reach, due to differences between people and between joint placements; our own choice.
+/// Standard deviation of a reach, as a fraction of the reach, due to differences between people and between joint placements; our own
+/// choice.
 const REACH_SPREAD: f64 = 0.06;
 
 /// Maximum contribution of a single bone to [`Verdict::deviation`], in standard deviations.

@@ -1,4 +1,4 @@
-//! Bone lengths as shares of the stature, and their spread among people.
+//! Bone lengths as fractions of the stature, and their spread among people.
 
 /// Standard deviation of the measured length of a bone from its true length, in metres.
 ///
@@ -36,14 +36,14 @@ pub enum Kind {
     Head,
 }
 
-/// The length of a kind of bone, as a share of the stature.
+/// The length of a kind of bone, as a fraction of the stature.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Proportion {
     /// Mean fraction in adults.
     pub adult: f64,
     /// Mean fraction in a three-year-old child.
     pub child: f64,
-    /// Standard deviation among people, as a share of the length.
+    /// Standard deviation among people, as a fraction of the length.
     pub people: f64,
     /// Standard deviation due to differences between detectors and data sets in the positions of joints, as a fraction of the length.
     pub place: f64,
@@ -122,7 +122,7 @@ impl Kind {
         self as usize
     }
 
-    /// Returns the length of this kind of bone as a share of the stature.
+    /// Returns the length of this kind of bone as a fraction of the stature.
     ///
     /// The sources have these short names:
     ///

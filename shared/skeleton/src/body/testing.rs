@@ -110,7 +110,7 @@ pub(crate) fn learn(lengths: &mut Lengths, joints: &Joints) {
     }
 }
 
-/// Returns the joints of a person with left and right exchanged.
+/// Returns the joints of a person with left and right swapped.
 pub(crate) fn mirrored<T: Copy>(joints: &[T; N_JOINTS]) -> [T; N_JOINTS] {
     [5, 4, 3, 2, 1, 0, 11, 10, 9, 8, 7, 6, 12, 13].map(|joint| joints[joint])
 }

@@ -17,7 +17,7 @@ pub struct Received {
     pub frame: u64,
     /// Time at which the message was sent, in nanoseconds; 0 if unknown.
     pub sent_at: u64,
-    /// Whether the message carries a result and, if not, why. Heartbeats always carry a result.
+    /// States whether the message carries a result and, if not, why. Heartbeats always carry a result.
     pub status: Status,
     /// Only for heartbeats and for pictures of cameras, which are numbered: the epoch (number of restarts) of the process, and the number
     /// of messages that it has sent in this epoch.

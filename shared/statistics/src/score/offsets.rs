@@ -1,4 +1,4 @@
-//! Mean offsets of found joints along and across their bones, in shares of the person's height.
+//! Mean offsets of found joints along and across their bones, in fractions of the person's height.
 //!
 //! PCP and PCK count joints that are close enough to their annotated positions; they do not show a systematic offset. A bone points
 //! outwards from the trunk to the joint at its end. *Along* is positive if the joint is found too far from the trunk: a knee that is found

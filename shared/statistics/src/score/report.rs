@@ -5,7 +5,7 @@ use std::fmt;
 use crate::score::pck::{PCK_GROUPS, joints_found};
 use crate::score::pcp::{PARSE_STICKS, Pcp, PcpRule, sticks_found};
 
-/// PCK thresholds, as shares of the person's size.
+/// PCK thresholds, as fractions of the person's size.
 pub const PCK_SHARES: [f64; 2] = [0.1, 0.2];
 
 /// PCP by both rules and PCK at both thresholds, per stick and per joint.
