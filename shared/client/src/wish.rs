@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-/// Which parts of every frame a client takes, and which frames it receives.
+/// The parts of every frame that a client takes, and the frames that it receives.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Wish {
     pub(crate) skeletons: bool,

@@ -21,7 +21,7 @@ pub enum FootageError {
         path: String,
         /// Kind of source.
         what: &'static str,
-        /// What to do: the input to use instead.
+        /// Advice for the user: the input to use instead.
         instead: String,
     },
     /// The name of the footage is empty.

@@ -9,7 +9,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 /// Maximum size of an answer's head, in bytes.
 const MAX_HEAD: u64 = 16 << 10;
 
-/// What a camera has answered.
+/// Kind of answer that a camera has sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Answer {
     /// The answer is one picture, not a stream.

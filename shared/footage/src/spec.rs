@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{FootageError, Rotation};
 
-/// Which numbers in the names of pictures belong to frames: `first`, `first + step`, ...
+/// The numbers in the names of pictures that belong to frames: `first`, `first + step`, ...
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PictureNumbers {
     /// Number in the name of frame 0.
@@ -31,7 +31,7 @@ pub struct SourceSpec {
     pub count: Option<u64>,
     /// Frames per second of footage that has no rate of its own: images, but not videos.
     pub frame_rate_hz: Option<f64>,
-    /// Which numbers in the names of pictures belong to frames; a number without a picture is then a missing frame. If not set, the
+    /// The numbers in the names of pictures that belong to frames; a number without a picture is then a missing frame. If not set, the
     /// pictures are numbered in order, regardless of their names.
     pub numbers: Option<PictureNumbers>,
     /// How the pictures are rotated.

@@ -254,12 +254,12 @@ pub struct KeypointNames {
     pub set: Option<String>,
     /// Names of the keypoints in the order of the output, instead of a set.
     pub names: Option<Vec<String>>,
-    /// What left and right mean.
+    /// Meaning of left and right.
     #[serde(default)]
     pub sides: Sides,
 }
 
-/// What left and right mean in the names of keypoints.
+/// Meaning of left and right in the names of keypoints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sides {

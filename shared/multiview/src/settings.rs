@@ -16,7 +16,7 @@ pub enum EnergyKind {
     Released,
 }
 
-/// Which expected error can switch the terms of a part off, in the paper's energy.
+/// The expected error that can switch the terms of a part off, in the paper's energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SwitchBy {
     /// The error of either view: the paper's eq. 6.
@@ -85,7 +85,7 @@ pub struct Settings {
     /// Expected error above which a part is switched off, in pixels of the frame, one per part; if empty,
     /// no part is switched off.
     pub tau_px: Vec<f32>,
-    /// Which expected error switches a part off.
+    /// The expected error that switches a part off.
     pub switch: SwitchBy,
     /// The same thresholds as `tau_px`, but in tenths of the person's size in the view; used if `tau_px` is empty. The size is the longer
     /// side of the rectangle around the part centres of the view's best pose.

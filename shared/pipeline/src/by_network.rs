@@ -37,7 +37,7 @@ pub struct ViewFrame<'a> {
     pub skew_s: f64,
 }
 
-/// What a view provides for a frame.
+/// Input that a view provides for a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum ViewContent<'a> {
     /// The picture of the view.

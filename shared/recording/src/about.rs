@@ -9,7 +9,7 @@ pub(crate) const TOPICS: &str = "parallax.topics";
 /// Version of the format that this crate writes. It reads no other version.
 const FORMAT: &str = "3";
 
-/// Which data was left out on purpose.
+/// The kinds of data that were left out on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Without {
     /// True if frames are recorded without pixels.
@@ -29,7 +29,7 @@ pub struct About {
     pub began_unix_nanos: u64,
     /// Settings of the run, as JSON.
     pub settings: String,
-    /// Which data was left out on purpose.
+    /// The kinds of data that were left out on purpose.
     pub without: Without,
 }
 

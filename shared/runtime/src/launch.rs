@@ -49,7 +49,7 @@ pub struct Launch {
     pub session: u64,
     /// Number of restarts of the process, which goes into the stamp of every message.
     pub epoch: u32,
-    /// What happens if a receiver is slower than its sender.
+    /// Behaviour if a receiver is slower than its sender.
     pub delivery: Delivery,
     /// Process id of the supervisor. This process ends when the supervisor ends.
     pub supervisor: Option<u32>,

@@ -12,7 +12,7 @@ use failure::{DEFECT, ExitKind, Failure, Stop, init_logging, log_panics, panic_t
 
 use crate::{Bus, Delivery, Health, Launch, Patience, Progress};
 
-/// What a service can use: the bus for its ports, its stop request and its counters.
+/// Everything that a service can use: the bus for its ports, its stop request and its counters.
 #[derive(Debug)]
 pub struct Service {
     bus: Bus,

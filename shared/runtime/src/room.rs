@@ -11,7 +11,7 @@ use crate::reserve::{Refused, n_refused, refused};
 /// Memory for queues and management of one process, in bytes: ten times the measured size.
 pub(crate) const OVERHEAD_BYTES: u64 = 1 << 20;
 
-/// What to do if there is not enough space.
+/// Advice for the user if there is not enough space.
 pub(crate) const ROOM: &str = "make room in /dev/shm: end other programs that use it, or make it larger (in Docker --shm-size)";
 
 /// If there was no room for a segment, returns a text with the requested size, the free size, and what to do.

@@ -43,7 +43,7 @@ pub enum VideoError {
         what: &'static str,
         /// Requested value.
         wanted: String,
-        /// What the device offers instead.
+        /// Formats, sizes or rates that the device offers instead.
         offered: String,
     },
     /// The device does not have the requested control.

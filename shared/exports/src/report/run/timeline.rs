@@ -1,4 +1,4 @@
-//! Which views contributed over time: a row for every view, a tick for every result.
+//! The views that contributed over time: a row for every view, a tick for every result.
 
 use super::space::Space;
 use crate::report::html::{Html, put};
