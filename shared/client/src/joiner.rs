@@ -112,8 +112,8 @@ impl<P> Joiner<P> {
         Some(gathered)
     }
 
-    /// Returns the frames that need not wait any longer, in order. Frames before them stop waiting, too; if skeletons are requested, frames
-    /// without a skeleton are given up.
+    /// Returns, in order, the frames that need not wait any longer. Frames before them stop waiting, too; if skeletons are requested,
+    /// frames without a skeleton are given up.
     ///
     /// The skeleton is the last message about a frame. When it arrives, all other parts have arrived or will never arrive.
     pub(crate) fn take(&mut self, now: Instant) -> Vec<Gathered<P>> {

@@ -4,9 +4,9 @@
 //! [`run`], which draws the skeleton in space.
 //!
 //! Markup is a separate type that accepts only constants of the program, numbers and escaped text. Templates were considered but are not
-//! used, because most of the content of these pages is SVG made in loops from numbers, which templates would not shorten. The page of a
-//! model must also be valid XML, in which empty elements end with a slash, but `maud` writes only the empty elements of HTML. Each page has
-//! a test with text that would break the page if it were not escaped.
+//! used, because most of the content of these pages is SVG made in loops from numbers, which templates would not shorten. Also, the page of
+//! a model must be valid XML, in which empty elements end with a slash, but the template library `maud` writes empty elements as in HTML.
+//! Each page has a test with text that would break the page if it were not escaped.
 
 pub mod html;
 pub mod parts;

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use crate::{ExitKind, Failure, in_file};
 
-/// The lock file in the folder. It is never removed: only the lock on it counts, and the system releases the lock when
-/// the process ends.
+/// Name of the lock file in the folder. The file is never removed: only the lock on it matters, and the system releases the lock when the
+/// process ends.
 const FILE: &str = ".parallax.lock";
 
 /// Exclusive write access to a folder; released when dropped.

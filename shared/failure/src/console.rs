@@ -27,7 +27,7 @@ pub trait Console: Debug + Send + Sync {
     /// Fails if the output cannot be written.
     fn result(&self, text: &str) -> Result<(), Failure>;
 
-    /// Returns true if the progress bar shows the steps, so that messages about them are not needed.
+    /// Returns true if the progress bar shows the steps, so that no messages about them are needed.
     fn shows_bar(&self) -> bool;
 
     /// Restarts the bar at 0.

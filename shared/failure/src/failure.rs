@@ -12,7 +12,7 @@ use crate::wording::in_words;
 /// | status | meaning |
 /// |---|---|
 /// | 0 | done |
-/// | 1 | the run failed: a process, the transport or the system gave up |
+/// | 1 | the run failed: a process, the transport or the system failed |
 /// | 2 | the command line is wrong |
 /// | 3 | a configuration is wrong: an unknown key, a value out of range, settings that contradict each other |
 /// | 4 | an input is missing, unreadable or malformed: footage, model, table |

@@ -83,7 +83,7 @@ fn write_and_exit(text: &[u8]) {
     signal_hook::low_level::exit(c_int::from(ExitKind::Run.status()));
 }
 
-/// Writes the message and ends the process.
+/// Signal handler: writes the message and ends the process.
 extern "C" fn end(signal: c_int, _info: *mut libc::siginfo_t, _context: *mut libc::c_void) {
     let text = if signal == SIGBUS {
         NO_MEMORY

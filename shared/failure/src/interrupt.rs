@@ -1,4 +1,4 @@
-//! Work that a signal can end in time, even if the work rarely checks the flag.
+//! Runs work that a signal can end in time, even if the work rarely checks the stop flag.
 
 use core::time::Duration;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use crate::{ExitKind, Failure, OrFail as _, Stop};
 
-/// Time that the work may take to notice the flag.
+/// Time within which the work should notice the flag.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Pause between two checks of the flag.

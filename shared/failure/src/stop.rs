@@ -21,10 +21,10 @@ use crate::now_nanos;
 
 /// The signals that request a stop.
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
-/// Signals within this time after the first count as one request: `timeout` sends two, and so does a closing terminal.
+/// Signals within this time after the first count as one request, because `timeout` sends two signals, and so does a closing terminal.
 const SAME_WISH: Duration = Duration::from_millis(500);
-/// Time that a process continues after a signal that is not from its supervisor, in seconds. systemd signals all processes at once,
-/// including the supervisor, which then ends the other processes in order.
+/// Time for which a process continues after a signal that is not from its supervisor, in seconds. For example, systemd signals all
+/// processes at once, including the supervisor, which then ends the other processes in order.
 const UNASKED_SECONDS: u32 = 2;
 /// The exit status of a process that is ended by a second signal.
 const ENDED_AT_ONCE: i32 = 130;
@@ -42,7 +42,7 @@ struct Inner {
     signal: AtomicUsize,
     /// Time of the first signal, from [`now_nanos`]; 0 if there was none.
     first_at_nanos: AtomicU64,
-    /// Number of the last signal that was not from the supervisor; 0 if there was none.
+    /// Number of the last signal that was not sent by the supervisor; 0 if there was none.
     unasked: AtomicUsize,
     /// Becomes readable when stop is requested, and is never read.
     reader: UnixStream,
@@ -96,9 +96,8 @@ impl Stop {
 
     /// Creates a stop request that the same signals raise if the supervisor sends them.
     ///
-    /// Signals of other processes concern only this process, not the run. They end this process two seconds later, as
-    /// if they were not handled, unless the supervisor has requested a stop by then. The supervisor then restarts
-    /// it, as after any other unexpected end.
+    /// Signals of other processes concern only this process, not the run. They end this process after two seconds, unless the supervisor
+    /// has requested a stop by then. The supervisor then restarts it, as after any other unexpected end.
     ///
     /// * `supervisor`: process id of the supervisor.
     ///
@@ -168,7 +167,7 @@ impl AsFd for Stop {
     }
 }
 
-/// The work of the signal handlers: atomics, the clock, and one system call. It neither allocates nor locks.
+/// The work of the signal handlers: only atomic operations, reading the clock, and one system call. This code neither allocates nor locks.
 impl Inner {
     fn raise(&self, signal: i32) {
         self.signal.store(signal as usize, Ordering::Release);

@@ -1,7 +1,7 @@
 //! Error texts for users.
 //!
-//! This module writes an error with its causes in one line, and replaces terms of the TOML and JSON parsers and of the transport by
-//! words that users know. It also quotes words of commands and aligns tables.
+//! This module writes an error with its causes in one line, and replaces terms of the TOML and JSON parsers and of the transport with words
+//! that users know. It also quotes words of shell commands and aligns tables.
 
 mod causes;
 mod table;

@@ -46,7 +46,7 @@ pub(crate) fn cuts(source: &Source<'_>, first: usize, cuts: &mut Vec<Cut>) {
             y: of_axis(1),
         };
     }
-    // The sizes after repeated halving of the first cut.
+    // Compute the sizes after repeated halving of the first cut.
     for octave in 1..cuts.len() {
         let half = |range: Range<usize>| range.start / 2..range.end.div_ceil(2);
         cuts[octave] = Cut {

@@ -1,7 +1,8 @@
 //! Keeps the right and the left limbs of a person apart, even if the evidence places both at one point.
 //!
 //! The tree has no bone between the two legs. If a network shows both ankles in the map of either ankle, both legs may end up at the ankle
-//! that is seen better. That evidence then counts twice, and nothing explains the other foot. A term on pairs of joints prevents this:
+//! that is seen better. The evidence for that ankle then counts twice, and the evidence for the other ankle is ignored. A term on pairs of
+//! joints prevents this:
 //!
 //! `E_apart(X) = - a sum_(r,l) max(0, 1 - |X_r - X_l| / d)`
 //!

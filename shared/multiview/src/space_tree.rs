@@ -148,7 +148,7 @@ pub fn lengths_of(joints: Option<&[Option<Point3<f64>>; N]>) -> [BoneLength; N -
 /// Places to avoid: for each joint, the place of the joint on the other side. `None` for a joint without such a constraint.
 pub(crate) type Occupied = [Option<Point3<f64>>; N];
 
-/// Returns the cost of a joint near the other joint of its pair.
+/// Returns the cost of a joint for being close to the other joint of its pair.
 pub(crate) fn cost(at: &Point3<f64>, other: &Point3<f64>, settings: &SpaceSettings) -> f64 {
     let share = (at - other).norm() / settings.least_apart_m;
     settings.apart * (1.0 - share).max(0.0)

@@ -61,7 +61,7 @@ impl Candidate {
 /// The poses of one view.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidates {
-    /// The poses from the view's pairs, or the view's own pose if it is in no pair; never empty.
+    /// The poses from the view's pairs, or the view's own pose if the view is not in a pair; never empty.
     pub(crate) poses: Vec<Candidate>,
     /// Number of poses that result from pairs.
     pub(crate) n_pairs: usize,

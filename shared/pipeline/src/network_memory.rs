@@ -37,7 +37,7 @@ pub struct NetworkMemory {
     pub(crate) n_seen: usize,
     /// The people of the previous frame.
     pub(crate) before: Vec<Seen>,
-    /// Boxes of the detector in which nobody was seen.
+    /// Boxes of the detector in which nobody was found.
     pub(crate) empty: Vec<Empty>,
     /// Number of frames until the next search for boxes; `None` before the first frame.
     pub(crate) until: Option<u64>,
@@ -67,7 +67,7 @@ pub(crate) struct Hold {
     pub(crate) most: u64,
 }
 
-/// A box of the detector in which nobody was seen.
+/// A box of the detector in which nobody was found.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Empty {
     /// The box, in pixels: left, top, right, bottom.

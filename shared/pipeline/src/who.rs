@@ -26,7 +26,7 @@ pub struct KnownPerson {
 /// The people of a frame.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FramePeople {
-    /// The people, the followed person first. If only other people are seen, the entry of the followed person is still there.
+    /// The people, the followed person first. The followed person keeps an entry even if only other people are seen.
     pub people: Vec<KnownPerson>,
     /// Number of people on which several views agree.
     pub n_seen: usize,
@@ -80,8 +80,8 @@ impl WhoStep {
         Self::remembering(cameras, settings, &memory, 0)
     }
 
-    /// Prepares the step to continue the work of an earlier one, with its people and ids; `None` if the numbers do not come from
-    /// [`memory`](Self::memory).
+    /// Prepares the step so that it continues where an earlier step stopped, with the same people and ids; `None` if the numbers do not
+    /// come from [`memory`](Self::memory).
     pub fn resume(cameras: Vec<Camera>, settings: WhoSettings, memory: &[f64]) -> Option<Self> {
         let (followed, memory) = memory.split_first()?;
         let memory = Memory::from_numbers(memory)?;

@@ -69,5 +69,5 @@ impl MessageHead {
     }
 }
 
-/// Number of bytes from the beginning of a message to the end of its frame number: the preamble of CDR, the session, the frame.
+/// Number of bytes from the beginning of a message to the end of its frame number. They are the preamble of CDR, the session and the frame.
 pub(crate) const FRAME_END: usize = PREAMBLE.len() + 8 + 8;

@@ -6,7 +6,7 @@ use crate::chunk::{Chunk, HEAD_BYTES};
 use crate::message::PREAMBLE;
 use crate::{Entry, Kind, Message, Recording, message};
 
-/// Maximum number of bytes that are reserved because a file states this length.
+/// Maximum number of bytes that are reserved in advance for a length that a file states.
 const MOST_RESERVED: u64 = 64 << 20;
 
 /// Reason why a recording cannot be read.

@@ -72,7 +72,7 @@ impl<R: Read + Seek> Scan<'_, R> {
                 Err(Stop::Damaged(what)) => Some(what),
                 Err(Stop::Cut) => None,
             };
-            // A damaged length may look like the end of the file.
+            // A damaged length can make a record seem to extend beyond the end of the file.
             let whole = self.found.extent.whole_bytes;
             let is_found = self.go_to_next(begin + 1)?;
             if let Some(what) =

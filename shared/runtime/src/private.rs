@@ -311,7 +311,7 @@ pub(crate) fn shared_memory(namespace: &Namespace) -> Result<(), PrivacyError> {
     each_segment(namespace, |memory, name, found| {
         let is_file = FileType::from_raw_mode(found.st_mode) == FileType::RegularFile;
         if is_file && found.st_mode & OTHERS != 0 {
-            // The file belongs to this user, and only this user may replace it in `/dev/shm`.
+            // This is safe because the file belongs to this user, and only this user may replace it in `/dev/shm`.
             return chmodat(memory, name, FILE, AtFlags::empty());
         }
         Ok(())

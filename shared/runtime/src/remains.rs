@@ -20,7 +20,7 @@ pub struct Remains {
     pub namespace: Namespace,
     /// True if the deployment's directory has the marker file. Other directories are never removed.
     pub is_marked: bool,
-    /// Process id of the supervisor; `None` if the deployment does not run.
+    /// Process id of the supervisor; `None` if the deployment is not running.
     pub supervisor: Option<u32>,
     /// Names and process ids of the deployment's processes.
     pub processes: Vec<String>,
@@ -43,7 +43,7 @@ impl Remains {
 
 /// Returns the deployments below a directory, sorted by name. Changes nothing.
 ///
-/// * `base`: the directory, as for [`Namespace::below`]. For deployments of [`Namespace::new`], it is [`Namespace::usual_base`].
+/// * `base`: the directory, as for [`Namespace::below`]. [`Namespace::new`] uses [`Namespace::usual_base`].
 ///
 /// # Errors
 ///
@@ -59,7 +59,7 @@ pub fn deployments(base: &Path) -> Result<Vec<Remains>, LockError> {
         source: error.into(),
     };
     for name in beneath::names(&opened).map_err(unreadable)? {
-        // Entries with other names cannot be deployments.
+        // Entries with names that are not valid for deployments are skipped.
         let namespace = name.to_str().ok();
         let namespace = namespace.and_then(|name| Namespace::below(name, base).ok());
         // A link to a directory is not a deployment either.

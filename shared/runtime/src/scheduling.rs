@@ -30,7 +30,7 @@ pub struct Scheduling {
     pub spin: bool,
 }
 
-/// A priority above the priorities of all ordinary processes.
+/// A priority above those of all ordinary processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RealTime {
     /// The order among threads of the same priority.

@@ -26,7 +26,7 @@ pub(crate) enum Course {
 }
 
 impl Performance {
-    /// Returns the frames of all bones at a time, in the frame of the stage.
+    /// Returns the frames of reference of all bones at a time, in the frame of the stage.
     pub(crate) fn frames(&self, seconds: f64) -> [Isometry3<f64>; N_BONES] {
         match &self.course {
             Course::Acted(motion) => self.bones.frames(&motion.pose(seconds)),

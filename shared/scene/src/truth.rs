@@ -149,7 +149,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Returns the header as a line, without the end of the line.
+    /// Returns the header as a line of text, without a line break.
     ///
     /// # Errors
     ///
@@ -174,7 +174,7 @@ impl Frame {
         Ok(frame)
     }
 
-    /// Returns the frame as a line, without the end of the line.
+    /// Returns the frame as a line of text, without a line break.
     ///
     /// # Errors
     ///

@@ -48,7 +48,7 @@ impl Past {
 impl Intake {
     /// Creates an intake, which selects the frames to process.
     ///
-    /// * `past`: progress of earlier epochs of this process.
+    /// * `past`: progress made before the process was restarted.
     pub(crate) fn new(delivery: Delivery, [start_frame, frame_step]: [u64; 2], past: Past) -> Self {
         Self {
             delivery,

@@ -21,7 +21,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// Interval between messages with the names that the lines omit.
 const NAMES: Duration = Duration::from_secs(1);
 
-/// Counts of sent and unsent frames and datagrams.
+/// Counts of frames and datagrams that were sent, and of those that were not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Frames that were published.
@@ -38,7 +38,7 @@ pub struct Counts {
 
 /// Sends the skeletons of a deployment until a stop is requested.
 ///
-/// * `until_end`: ends when the deployment has ended, instead of waiting for its next run.
+/// * `until_end`: true to end when the deployment has ended, instead of waiting for its next run.
 ///
 /// # Errors
 ///

@@ -63,7 +63,7 @@ impl Workload {
     }
 }
 
-/// Path of a file in the folder beside the clone, if it exists.
+/// Returns the path of a file in the folder beside the clone, if the file exists.
 fn real(name: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
     let path = root.join(name);

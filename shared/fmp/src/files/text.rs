@@ -12,9 +12,9 @@ use crate::{Filter, Model, ModelSpec, N_CHANNELS, Spring};
 
 /// Reads the authors' text format.
 ///
-/// The format consists of keywords and arrays in a fixed order, separated by white space. An array is `rows cols planes` and then its
-/// values, row fastest, plane slowest. Indices count from 1. Deformations are `dx^2 dx dy^2 dy`, anchors `x y octave`. The start offsets
-/// `*_i` and `obj` are only used in training and are skipped; `len` and `obj` may be absent.
+/// The format consists of keywords and arrays in a fixed order, separated by white space. An array consists of `rows cols planes`, followed
+/// by its values; the row index changes fastest, and the plane index slowest. Indices count from 1. Deformations are `dx^2 dx dy^2 dy`,
+/// anchors `x y octave`. The start offsets `*_i` and `obj` are only used in training and are skipped; `len` and `obj` may be absent.
 ///
 /// A tree like that of the published models gets the published part names and mirror permutation. Memory is never reserved just because the
 /// text states a count: the memory used is proportional to the size of the text.

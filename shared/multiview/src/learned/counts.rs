@@ -175,7 +175,7 @@ fn lift(joint: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Returns the frequency of every type of every part over all counts, with one extra observation of each type.
+/// Returns the frequency of every type of every part over all counts. One extra observation of each type is added.
 pub fn marginals(shape: &Shape, all: &[&Counts]) -> Vec<Vec<f64>> {
     let mut sums: Vec<Vec<f64>> = shape.n_types.iter().map(|&n| vec![1.0; n]).collect();
     for counts in all {

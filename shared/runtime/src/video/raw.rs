@@ -71,7 +71,8 @@ pub(super) const QUERYMENU: Request = both(37);
 pub(super) const ENUM_FRAMESIZES: Request = both(74);
 pub(super) const ENUM_FRAMEINTERVALS: Request = both(75);
 
-/// Capture of pictures in one plane (`V4L2_BUF_TYPE_VIDEO_CAPTURE`), and memory of the kernel (`V4L2_MEMORY_MMAP`).
+/// Type of the stream: pictures in a single plane (`V4L2_BUF_TYPE_VIDEO_CAPTURE`); the next constant is memory that the kernel provides
+/// (`V4L2_MEMORY_MMAP`).
 pub(super) const VIDEO_CAPTURE: u32 = 1;
 pub(super) const MEMORY_MMAP: u32 = 1;
 pub(super) const CAP_VIDEO_CAPTURE: u32 = 1;
