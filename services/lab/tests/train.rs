@@ -307,7 +307,11 @@ fn bad_labels_are_reported_and_counted_or_fatal() {
     );
 
     let fatal = drawn.train("n.fmp", &["--fatal", "syntax,image"]).wait();
-    assert_ended(&fatal, 4, &["2 of 23 people", "fault of a fatal kind", "line 17"]);
+    assert_ended(
+        &fatal,
+        4,
+        &["2 of 23 people", "fault of a fatal kind", "line 17"],
+    );
     let all = drawn.train("n.fmp", &["--fatal", "all"]).wait();
     assert_ended(&all, 4, &["8 of 23 people"]);
     assert!(is_gone(&drawn.path("n.fmp")));
