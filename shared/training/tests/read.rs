@@ -227,7 +227,7 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
     );
     let expected = [
         "people.jsonl, line 3: the name \"ann\" is already used in line 1",
-        "people.jsonl, line 4: the image and the joints are the same as in line 1",
+        "people.jsonl, line 4: the same image and joints as line 1",
         "people.jsonl, line 5: 3 joints, expected 2",
         "people.jsonl, line 6: joint 2 is unknown",
         "people.jsonl, line 7: all joints are within 0.000 px of (7.0, 2.0)",

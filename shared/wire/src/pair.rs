@@ -10,7 +10,7 @@ use crate::{WireError, pose_from_message, pose_to_message};
 
 /// Writes the result of a pair, or that there is no result. The caller fills in stamp and timing.
 ///
-/// Of [`PairEstimate::iterations`], the message contains only the length.
+/// The message contains only the length of [`PairEstimate::iterations`].
 ///
 /// * `views_present`: bit `v` is set if view `v` delivered a pose in time.
 ///

@@ -193,7 +193,7 @@ mod tests {
     fn messages_of_another_session_or_view_are_refused() {
         let (cause, text) = refused(|header| header.stamp.session = 8);
         assert_eq!(cause, Refusal::Session);
-        assert_eq!(text, "the session is 8, expected 7");
+        assert_eq!(text, "session is 8, expected 7");
         let (cause, text) = refused(|header| header.stamp.view = u32::MAX);
         assert_eq!(cause, Refusal::Sender);
         assert_eq!(

@@ -409,6 +409,6 @@ mod tests {
             is_lossless: false,
             has_dead: true,
         };
-        assert_eq!(case.folder(), "2-views-one-dead");
+        assert_eq!(case.folder(), "2-views-one-camera-killed");
     }
 }

@@ -341,7 +341,7 @@ mod tests {
             (|_, _| (), nothing),
             (
                 |series, _| series.n_kills = 4,
-                &["kills followed by a recovery"],
+                &["kills with a recovery"],
             ),
             (
                 |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),

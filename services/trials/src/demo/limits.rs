@@ -241,7 +241,7 @@ mod tests {
             ),
             (
                 |run| run.changed_cost(|cost| cost.results_without_it = 0),
-                "results of the others during the fault",
+                "results of the other cameras during the fault",
             ),
             (
                 |run| run.changed_cost(|cost| cost.longest_pause_ms = Some(2001.0)),
@@ -311,7 +311,7 @@ mod tests {
         assert_eq!(missed(back(1099.0)), Vec::<String>::new());
         assert_eq!(
             missed(back(1101.0)),
-            ["results of the others during the fault"]
+            ["results of the other cameras during the fault"]
         );
     }
 

@@ -21,7 +21,7 @@ pub enum VggError {
     #[error("its header cannot be read")]
     Header(#[from] serde_json::Error),
     /// A layer is missing.
-    #[error("there is no `{name}`")]
+    #[error("the file has no `{name}`")]
     Missing {
         /// Name of the layer.
         name: String,

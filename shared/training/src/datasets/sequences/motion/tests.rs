@@ -275,7 +275,7 @@ fn files_that_cannot_be_used_are_refused() {
     let got = refused(read("a.trc", text.replace("\n50\t", "\n0\t"), &options));
     assert_eq!(got, "trc: 0 frames a second");
     let got = refused(read("a.trc", text.replace("\tm\n", "\tmiles\n"), &options));
-    assert!(got.contains("the unit \"miles\" is not known"), "{got}");
+    assert!(got.contains("unit \"miles\" is not known"), "{got}");
     let beyond = MotionOptions {
         frames: Some([5, 21]),
         ..options
