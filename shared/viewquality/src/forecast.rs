@@ -229,9 +229,6 @@ mod tests {
     #[test]
     fn an_infinite_output_is_rejected() {
         let error = run(&mut constant(f32::INFINITY, Unit::Pixels, 1.0), 1.0).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "the network's output for part 1 is inf"
-        );
+        assert_eq!(error.to_string(), "the network's output for part 1 is inf");
     }
 }

@@ -339,10 +339,7 @@ mod tests {
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [
             (|_, _| (), nothing),
-            (
-                |series, _| series.n_kills = 4,
-                &["kills with a recovery"],
-            ),
+            (|series, _| series.n_kills = 4, &["kills with a recovery"]),
             (
                 |series, _| series.downtime_ms = Spread::of(vec![500.0, 700.0, 8001.0]),
                 &["time until back (p99), ms"],
