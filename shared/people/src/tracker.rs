@@ -37,8 +37,8 @@ const FRAMES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
 /// Factor in the cost of a detection whose colour fits another person nearby better, in metres per unit of colour difference; the next
 /// constant is the maximum distance of that other person, in metres.
-const RIVAL_M: f64 = 2.0;
 const COLOUR_M: f64 = 2.0;
+const RIVAL_M: f64 = 2.0;
 /// A person is left without a detection rather than given one that costs more than this multiple of the largest reach.
 const UNSEEN: f64 = 2.0;
 /// A missed person is recognised by the colour of the trunk within [`MISSED_M`], if the colours differ by less than this.

@@ -4,7 +4,7 @@ use kernels::Rgb8View;
 
 use crate::placed::N;
 
-/// The joints of the trunk: left and right hip, left and right shoulder.
+/// The joints of the trunk: right and left hip; the next constant has the right and left shoulder.
 const HIPS: [usize; 2] = [2, 3];
 const SHOULDERS: [usize; 2] = [8, 9];
 /// Number of samples along the trunk from the shoulders to the hips; the next constant is the number across the trunk.
