@@ -256,7 +256,7 @@ impl<'a> SimCc<'a> {
         &self.axes[axis][keypoint * n..(keypoint + 1) * n]
     }
 
-    /// Returns the maximum of every keypoint. Its score is the smaller of the scores of its two axes, unchanged from the network.
+    /// Returns the maximum of every keypoint. Its score is the smaller of its two axes' scores, exactly as the network outputs them.
     pub fn keypoints(&self, bins_per_pixel: f64) -> Vec<Keypoint> {
         let keypoint = |keypoint: usize| {
             let best = [0, 1].map(|axis| {

@@ -22,8 +22,8 @@ fn crowding(joints: &Occupied, pairs: &[[usize; 2]], settings: &SpaceSettings) -
     pairs.iter().map(of_pair).sum()
 }
 
-/// Returns the best of a solution and of new solutions for limbs that coincide: in these, the right or the left arm or leg is kept away
-/// from the other.
+/// Where limbs coincide, computes new solutions in which one arm or leg is kept away from the opposite one. Returns the best of these and
+/// of the given solution.
 ///
 /// * `first`: the best solution on the tree.
 /// * Returns the solution, and the places that its joints are kept away from.

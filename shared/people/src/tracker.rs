@@ -20,7 +20,7 @@ const LEAST_CORE: usize = 6;
 const LEAST_SEEN: usize = 5;
 /// Two people whose trunks are closer than this cannot be distinguished, in metres.
 const ONE_M: f64 = 0.3;
-/// Extra distance at which an unseen person is searched for, in metres, added to the maximum distance for single detections.
+/// Distance, in metres, that is added to the maximum distance for single detections if an unseen person is searched for.
 const TAKEN_UP_M: f64 = 0.25;
 /// Maximum distance, in metres, at which a new person can be a missed person; the next constant is the maximum mean difference of the
 /// logarithms of the bone lengths.

@@ -41,7 +41,7 @@ pub struct LatencyReport {
     pub stages: BTreeMap<String, Percentiles>,
     /// Time from sending to receiving while the receiver was not busy, which is the time that the transport takes.
     pub transport: BTreeMap<String, Percentiles>,
-    /// Time from sending to receiving while the receiver was still busy with earlier work.
+    /// Part of the time between sending and receiving in which the receiver was still busy with earlier work.
     pub waiting: BTreeMap<String, Percentiles>,
 }
 

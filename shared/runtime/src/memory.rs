@@ -93,8 +93,8 @@ pub(crate) fn memory_now() -> Option<[u64; 2]> {
 /// are enough.
 ///
 /// The first write to a page costs a page fault and the zeroing of the page (20 ms instead of 0.4 ms for a frame of 6 megabytes). If the
-/// file system is full at that time, the kernel kills the process with SIGBUS. With this function, the cost occurs in advance, and a full
-/// file system is reported as an error.
+/// file system is full at that time, the kernel kills the process with SIGBUS. This function pays the cost in advance, and reports a
+/// full file system as an error.
 ///
 /// * `port`: number of the publisher in iceoryx2, which is part of its pool's file name.
 /// * `mapped`: number of mapped chunks, and number of all chunks.

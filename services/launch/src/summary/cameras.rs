@@ -1,4 +1,4 @@
-//! Texts about cameras that contradict each other.
+//! Messages about cameras whose measurements are inconsistent with each other.
 
 use messages::{CameraCounts, TimedBy, UNMEASURED};
 use runfiles::{CameraFit, Contradicted, Exchanged};

@@ -368,12 +368,12 @@ mod tests {
         );
         assert_eq!(
             outcome(|model| edge(model, 1).parent = 3),
-            "part 2 names part 4, but there are 3"
+            "part 2 names part 4, but the model has only 3"
         );
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![0, 1, usize::MAX])),
             format!(
-                "part 3 names as its mirror part {}, but there are 3",
+                "part 3 names as its mirror part {}, but the model has only 3",
                 usize::MAX
             )
         );

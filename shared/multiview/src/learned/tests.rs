@@ -268,12 +268,12 @@ fn a_wrong_file_is_refused_with_the_field() {
         (
             "/rigs/0/pairs/0/cameras/0",
             json!("right"),
-            "`rigs[0].pairs[0]` is not of two cameras",
+            "`rigs[0].pairs[0]` is not for two cameras",
         ),
         (
             "/joints/0/weights/0/0",
             json!(7.0),
-            "`joints[0]` is not a row of weights that sum to 1",
+            "`joints[0]` is not a row of weights with the sum 1",
         ),
     ];
     for (at, to, expected) in cases {
