@@ -3,7 +3,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use kernels::{Conv, ConvSize};
+use kernels::{Conv, ConvSize, ConvSizeError};
 use rten_onnx::onnx::NodeProto;
 
 use crate::source::{Source, int, ints, op, text};
@@ -261,16 +261,7 @@ impl<'a> Finding<'a> {
         };
         let bias = bias.ok_or("the bias of the layer is not a constant")?;
         let out = [0, 1].map(|axis| (reach[axis] - size.kernel[axis]) / stride[axis] + 1);
-        let is_picture = input.stack == 0;
-        let has_tiles = !is_picture && is_large(size, out);
-        let weights = &weights.values;
-        let conv = if has_tiles {
-            Conv::in_tiles(size, weights, &bias)
-        } else {
-            Ok(None)
-        };
-        let conv = conv
-            .and_then(|conv| conv.map_or_else(|| Conv::new(size, weights, &bias, is_picture), Ok));
+        let conv = packed(size, (&weights.values, &bias), input.stack == 0, out);
         let conv = conv.map_err(|_error| "the weights of the layer do not match its shape")?;
         self.front.border = self.front.border.max(most);
         let operation = Operation::Conv {
@@ -380,6 +371,24 @@ const FEWEST_CHANNELS: usize = 32;
 /// Minimum number of outputs per channel at which a convolution in tiles is faster. With fewer outputs, reading the transformed weights
 /// takes longer than the products.
 const FEWEST_OUTPUTS: usize = 64;
+
+/// Packs the weights and biases of a convolution for the faster method.
+///
+/// * `is_picture`: true for a convolution of the network's input.
+/// * `out`: rows and columns of the output.
+fn packed(
+    size: ConvSize,
+    (weights, bias): (&[f32], &[f32]),
+    is_picture: bool,
+    out: [usize; 2],
+) -> Result<Conv, ConvSizeError> {
+    let in_tiles = if !is_picture && is_large(size, out) {
+        Conv::in_tiles(size, weights, bias)?
+    } else {
+        None
+    };
+    in_tiles.map_or_else(|| Conv::new(size, weights, bias, is_picture), Ok)
+}
 
 /// Returns true if a convolution is so large that tiles make it faster.
 fn is_large(size: ConvSize, [rows, cols]: [usize; 2]) -> bool {

@@ -113,6 +113,10 @@ pub fn rig_of(deployment: &Deployment) -> Result<Rig, Failure> {
 }
 
 /// Works like [`rig_of`], for uses that need only the lenses. A camera without a pose is placed at the origin.
+///
+/// # Errors
+///
+/// Fails like [`rig`].
 pub fn lenses_of(deployment: &Deployment) -> Result<Rig, Failure> {
     let options = ReadOptions {
         lenses_suffice: true,

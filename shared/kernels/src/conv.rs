@@ -60,7 +60,7 @@ pub struct Conv {
     /// Biases, padded with zeros to pairs of blocks like the outputs in the weights.
     bias: Vec<Row>,
     /// For a convolution in tiles: the 1 x 1 convolution of each position. Otherwise empty.
-    positions: Vec<Conv>,
+    positions: Vec<Self>,
 }
 
 /// Stacks to which a convolution or a sum writes its result: the plain values, the values with negative ones replaced by zero, or both.

@@ -18,6 +18,10 @@ pub struct Verbosity {
 }
 
 /// Writes a line of data. A closed pipe (as with `| head`) is not an error.
+///
+/// # Errors
+///
+/// Fails if standard output cannot be written to.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {

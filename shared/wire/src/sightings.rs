@@ -110,7 +110,7 @@ pub fn sightings_from_message(
 /// Reads the colour of a person's trunk.
 fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]>, WireError> {
     let colour = message.colours[nth];
-    if colour == NO_COLOUR {
+    if colour.map(f32::to_bits) == NO_COLOUR.map(f32::to_bits) {
         return Ok(None);
     }
     match colour.into_iter().find(|value| !(0.0..=1.0).contains(value)) {

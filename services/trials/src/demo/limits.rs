@@ -59,10 +59,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
     ];
     if let Some(cost) = measured.cost {
         let results = cost.killed_at_ms.map(|_| cost.results_without_it as f64);
-        let least = f64::from(u8::from(needs_results_meanwhile(
-            cost,
-            measured.deadline_ms,
-        )));
+        let needs_results = needs_results_meanwhile(cost, measured.deadline_ms);
         limits.extend([
             at_most(
                 "time until the killed camera is back, ms",
@@ -71,7 +68,7 @@ pub(super) fn judge(requested: &Limits, measured: &Measured<'_>) -> Vec<Limit> {
             ),
             at_least(
                 "results of the other cameras during the fault",
-                least,
+                f64::from(u8::from(needs_results)),
                 results,
             ),
             at_most(

@@ -23,6 +23,11 @@ const DRAWN: &str = "Each ring is a detected joint; the line leads to the positi
 /// Maximum number of skeletons that are drawn.
 const MOST_MOMENTS: usize = 150;
 
+/// The title and the head of the table of cameras.
+const CAMERAS: &str = "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>centre, m<th>joints<th>residual, px<th>fit, %\
+         <th>rotation &#177; degrees<th>centre &#177; mm<th>focal length, px<th>difference of halves, degrees<th>difference of halves, \
+         mm<th>offset, ms</tr>\n";
+
 /// Returns the page of `calibrate people`.
 ///
 /// * `names`: names of the cameras.
@@ -45,12 +50,7 @@ pub fn of_people(
         outcome.n_exchanged,
         number(100.0 * outcome.scale_sd, 1)
     );
-    put!(
-        out,
-        "<h2>Cameras</h2>\n<div class=\"scroll\"><table>\n<tr><th>camera<th>centre, m<th>joints<th>residual, px<th>fit, %\
-         <th>rotation &#177; degrees<th>centre &#177; mm<th>focal length, px<th>difference of halves, degrees<th>difference of halves, \
-         mm<th>offset, ms</tr>\n"
-    );
+    put!(out, "{}", Html::constant(CAMERAS));
     let each = names.iter().zip(&outcome.cameras).zip(&outcome.reports);
     for ((name, camera), it) in each {
         let centre = camera.centre_in_world();

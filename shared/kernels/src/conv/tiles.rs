@@ -2,6 +2,10 @@
 //! filtering F(2x2, 3x3) (Lavin & Gray 2016, section 4.1). A tile of 4 x 4 inputs is transformed, then multiplied position by position with
 //! the transformed kernel. The sums over the channels at one position are a 1 x 1 convolution in which the tiles take the place of the
 //! pixels. A last transform gives the outputs of the tile.
+#![expect(
+    clippy::needless_range_loop,
+    reason = "only ranges are unrolled surely, and that keeps values in registers"
+)]
 
 use super::blocked::BLOCK;
 use super::fast::Layer;
@@ -29,7 +33,8 @@ pub struct Scratch {
 ///
 /// * `weights`: `outputs x inputs x 3 x 3`.
 pub(super) fn positions(size: ConvSize, weights: &[f32]) -> Vec<Vec<f32>> {
-    let mut all = vec![Vec::with_capacity(size.outputs * size.inputs); POSITIONS];
+    let n = size.outputs * size.inputs;
+    let mut all: Vec<_> = (0..POSITIONS).map(|_| Vec::with_capacity(n)).collect();
     for kernel in weights.chunks_exact(9) {
         let column = |col: usize| [0, 1, 2].map(|row| f64::from(kernel[3 * row + col]));
         let columns = [0, 1, 2].map(|col| kernel_to_positions(column(col)));
@@ -45,7 +50,7 @@ pub(super) fn positions(size: ConvSize, weights: &[f32]) -> Vec<Vec<f32>> {
 
 /// The transform of a row or column of a kernel.
 fn kernel_to_positions([a, b, c]: [f64; 3]) -> [f64; SIDE] {
-    [a, (a + b + c) / 2.0, (a - b + c) / 2.0, c]
+    [a, 0.5 * (a + b + c), 0.5 * (a - b + c), c]
 }
 
 /// Positions of tiles in a stack.

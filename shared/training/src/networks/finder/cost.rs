@@ -24,7 +24,7 @@ pub struct Truth {
 pub struct Cost {
     /// The cost of the heat, divided by the number of people.
     pub heat: f32,
-    /// The cost of the boxes: the mean of -log(IoU), where IoU is the intersection over union with the true box.
+    /// The cost of the boxes: the mean of -log(`IoU`), where `IoU` is the intersection over union with the true box.
     pub sides: f32,
 }
 
