@@ -93,13 +93,9 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             (from_floor(&floor), "origin from standing people".to_owned())
         }
         (None, None) if arguments.at.is_empty() => {
-            return Err(Failure::new(
-                ExitKind::Usage,
-                "no board, no points on the floor and no people are given",
-            )
-            .with_hint(
-                "pass --board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN",
-            ));
+            let message = "no board, no points on the floor and no people are given";
+            let hint = "pass --board BOARD FOOTAGE..., or --at, --x and --floor, or --people RUN";
+            return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
         }
         (None, None) => {
             let clicks = [&arguments.at, &arguments.x, &arguments.floor];
