@@ -186,7 +186,7 @@ fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
 #[test]
 fn a_killed_triangulation_process_loses_few_frames_and_they_are_counted() {
     let run = Signalled::new(PACED, "KILL", "triangulate");
-    // Every frame has exactly one line, in order: a result, or the reason why there is none.
+    // Every frame has exactly one line, in order: a result, or the reason why it is missing.
     run.assert_every_frame();
     run.assert_reasons(&["process lost"], 20);
 }

@@ -21,7 +21,7 @@ pub struct Stamp {
     pub epoch: u32,
 }
 
-/// State of a message: it carries a result, or the reason why there is none.
+/// State of a message: it carries a result, or the reason why it is missing.
 ///
 /// A transparent number rather than an enum: any received bit pattern is valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]

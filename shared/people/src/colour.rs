@@ -14,7 +14,8 @@ pub(crate) type Rgb = [f64; 3];
 
 /// Minimum weight of a new colour in the mean.
 const NEW_COLOUR: f64 = 0.1;
-/// Number of frames after which a colour is taken as known. Before that, a new person may have been given the detections of others.
+/// Number of sightings, in one view or in all together, after which a colour is taken as known. Before that, a new person may have been
+/// given the detections of others.
 const KNOWN: u32 = 5;
 /// Light and shadow change the brightness by up to this factor; such a change does not count as a difference.
 const SHADE: f64 = 1.2;

@@ -2,6 +2,7 @@
 
 use kernels::Rgb8View;
 
+use crate::network_memory::median;
 use crate::placed::N;
 
 /// The joints of the trunk: right and left hip; the next constant has the right and left shoulder.
@@ -25,7 +26,7 @@ pub(crate) fn trunk_colour(
 ) -> Option<[f32; 3]> {
     let [top, bottom] = [SHOULDERS, HIPS].map(|pair| pair.map(|joint| joints[joint]));
     let (top, bottom) = ([top[0]?, top[1]?], [bottom[0]?, bottom[1]?]);
-    let mut values: [Vec<u8>; 3] = Default::default();
+    let mut values: [Vec<f64>; 3] = Default::default();
     for row in 0..DOWN {
         for col in 0..ACROSS {
             let down = at_share(HEIGHT, row, DOWN);
@@ -37,12 +38,16 @@ pub(crate) fn trunk_colour(
             });
             if let Some(pixel) = pixel(image, at) {
                 for (values, value) in values.iter_mut().zip(pixel) {
-                    values.push(value);
+                    values.push(f64::from(value) / 255.0);
                 }
             }
         }
     }
-    (values[0].len() > DOWN * ACROSS / 2).then(|| values.map(median))
+    if values[0].len() <= DOWN * ACROSS / 2 {
+        return None;
+    }
+    let [red, green, blue] = values.map(|values| median(values.into_iter()));
+    Some([red?, green?, blue?].map(|value| value as f32))
 }
 
 /// Returns the position of the `nth` of `n` samples between two limits, as a fraction.
@@ -57,12 +62,6 @@ fn pixel(image: Rgb8View<'_>, [x, y]: [f32; 2]) -> Option<[u8; 3]> {
     }
     let first = 3 * (y.round() as usize * image.width() + x.round() as usize);
     image.data().get(first..first + 3)?.try_into().ok()
-}
-
-fn median(mut values: Vec<u8>) -> f32 {
-    let middle = values.len() / 2;
-    let (_, value, _) = values.select_nth_unstable(middle);
-    f32::from(*value) / 255.0
 }
 
 #[cfg(test)]

@@ -244,7 +244,7 @@ fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]
     })
 }
 
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 

@@ -1,4 +1,4 @@
-//! `pose3d.jsonl`: a line for every frame, with its skeletons or the reason why there is none.
+//! `pose3d.jsonl`: a line for every frame, with its skeletons or the reason why it is missing.
 
 use std::collections::BTreeMap;
 

@@ -21,7 +21,7 @@ impl Grid {
         self.start_nanos.saturating_add((nth as f64 * self.period_nanos).round() as u64)
     }
 
-    /// Returns the index of the last frame whose nominal time is not after the given time; 0 if there is none.
+    /// Returns the index of the last frame whose nominal time is not after the given time; 0 if no such frame exists.
     pub fn latest(&self, nanos: u64) -> u64 {
         self.exact(nanos).max(0.0) as u64
     }

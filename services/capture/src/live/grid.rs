@@ -47,7 +47,7 @@ impl Grid {
         self.start_nanos.saturating_add((nth as f64 * self.period).round() as u64)
     }
 
-    /// Returns the index of the last frame whose nominal time is not after `now_nanos`; 0 if there is none.
+    /// Returns the index of the last frame whose nominal time is not after `now_nanos`; 0 if no such frame exists.
     pub(crate) fn latest(&self, now_nanos: u64) -> u64 {
         self.exact(now_nanos).max(0.0) as u64
     }

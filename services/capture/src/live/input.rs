@@ -100,7 +100,7 @@ impl Input {
         }
     }
 
-    /// Reads the next picture into `rgb`. Returns `None` if there is none yet.
+    /// Reads the next picture into `rgb`. Returns `None` if no picture has arrived yet.
     pub(super) fn next(&mut self, rgb: &mut [u8]) -> Result<Option<Taken>, LiveError> {
         match self {
             Self::Device(it) => it.next(rgb),

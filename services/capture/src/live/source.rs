@@ -116,7 +116,7 @@ impl Source {
         })
     }
 
-    /// Returns the oldest waiting picture; `None` if there is none within `patience`.
+    /// Returns the oldest waiting picture; `None` if no picture arrives within `patience`.
     pub(crate) fn next(&self, patience: Duration) -> Option<Picture> {
         let state = self.shared.state();
         let is_empty = |state: &mut State| state.waiting.is_empty();

@@ -28,7 +28,7 @@ fn save(folder: &Path, nth: u8, size: Size) {
     Canvas::new(size, [nth, 0, 0]).save_png(&file).unwrap();
 }
 
-/// Returns the outcome of every frame: the colour of its picture, or the reason why there is none.
+/// Returns the outcome of every frame: the colour of its picture, or the reason why it is missing.
 fn all(supply: &mut Supply) -> Vec<String> {
     let mut all = Vec::new();
     loop {

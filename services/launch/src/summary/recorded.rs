@@ -62,7 +62,7 @@ impl Recorded {
         }
     }
 
-    /// Returns the summary as JSON; null if there is none.
+    /// Returns the summary as JSON; null if no summary exists.
     pub(super) fn json(&self) -> Value {
         json!(self.written())
     }

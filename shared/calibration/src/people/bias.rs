@@ -71,7 +71,7 @@ impl Biases {
         self.places.get(camera)?.get(joint).copied()?
     }
 
-    /// Returns the bias of a joint in a camera, in pixels; 0 if there is none.
+    /// Returns the bias of a joint in a camera, in pixels; 0 if it has no bias.
     pub(super) fn of(&self, camera: usize, joint: usize) -> Vector2<f64> {
         self.place(camera, joint).map_or_else(Vector2::zeros, |i| self.values[i])
     }

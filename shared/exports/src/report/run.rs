@@ -81,12 +81,12 @@ pub struct Strip {
     pub pictures: Vec<Picture>,
 }
 
-/// One picture, or the reason why there is none.
+/// One picture, or the reason why it is missing.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     /// Name of the view.
     pub caption: String,
-    /// A JPEG file, or the reason why there is none.
+    /// A JPEG file, or the reason why it is missing.
     pub jpeg: Result<Vec<u8>, String>,
 }
 
