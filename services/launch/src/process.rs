@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
-use footage::SourceSpec;
+use footage::{SCALE_TOLERANCE, SourceSpec};
 use geometry::Framing;
 use messages::topic;
 use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep};
@@ -188,7 +188,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
 /// Returns the factor by which a decoder may shrink pictures that are scaled down to smaller frames.
 fn most_shrink(framing: &Framing) -> usize {
     let [[a, _, _], [c, _, _]] = framing.source_from_output();
-    (a.hypot(c) + 1e-9) as usize
+    (a.hypot(c) + SCALE_TOLERANCE) as usize
 }
 
 fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failure> {
@@ -419,6 +419,7 @@ mod tests {
     use std::path::Path;
 
     use deployment::{AnyMachine, Loaded, RecordingPlan, Topology};
+    use geometry::OutSize;
 
     use super::*;
 
@@ -445,6 +446,18 @@ mod tests {
         assert_eq!(all.pop(), Some(Name::Bridge), "with hosts alone");
         assert_eq!(found.len(), all.len());
         assert!(all.iter().all(|name| found.contains(name)), "{found:?}");
+    }
+
+    #[test]
+    fn pictures_of_a_lens_with_two_focal_lengths_are_shrunk_as_far_as_others() {
+        let rig = scene::RigChoice::parse("ring:2").unwrap().rig().unwrap();
+        let mut camera = rig.cameras()[0].clone();
+        let size = camera.intrinsics.size;
+        for share in [0.997, 1.0, 1.003] {
+            camera.intrinsics.fx = share * camera.intrinsics.fy;
+            let framing = Framing::new(&camera, size, None, OutSize::Scale(0.25), 0.03);
+            assert_eq!(most_shrink(&framing.unwrap()), 4, "{share}");
+        }
     }
 
     #[test]

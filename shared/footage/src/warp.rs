@@ -24,6 +24,10 @@ const MAX_SCALE: f64 = 64.0;
 /// Maximum translation, in pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
+/// Difference from a whole number of source pixels per output pixel that is ignored. The two focal lengths of a lens differ by less, so that
+/// a picture that is rotated and shrunk by a whole number takes as few samples as one that is only shrunk.
+pub const SCALE_TOLERANCE: f64 = 0.05;
+
 /// The value of pixels outside of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fill {
@@ -68,7 +72,7 @@ pub enum WarpError {
 /// * With a map that keeps rows and columns and does not enlarge (shrink, crop, mirror), the value is the area mean of the rectangle that
 ///   the output pixel covers. It is exact up to rounding to a grey level (half up).
 /// * With any other map, the value is the mean of `n × m` bilinear samples. They are spread evenly over the output pixel and are at most
-///   one source pixel apart. For a rotated image, the result is the same as rotating it at full size (bilinear) and then averaging areas.
+///   1.05 source pixels apart. For a rotated image, the result is the same as rotating it at full size (bilinear) and then averaging areas.
 ///   Positions are rounded to 1/32 source pixel. From 4 source pixels per output pixel on, the rounding is coarser, but never coarser than
 ///   1/64 output pixel.
 ///
@@ -120,7 +124,7 @@ impl Warp {
         } else if keeps_rows && a.abs() >= 1.0 && d.abs() >= 1.0 {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
-            let n_samples = scales.map(|scale| (scale - 1e-9).ceil().max(1.0) as usize);
+            let n_samples = scales.map(|scale| (scale - SCALE_TOLERANCE).ceil().max(1.0) as usize);
             let sizes = [source, output];
             let sampled = Sampled::new(sizes, source_from_output, n_samples, fill);
             Near::new(&sampled).map_or(Plan::Sampled(sampled), Plan::Near)
@@ -232,6 +236,17 @@ mod tests {
             (state >> 24) as u8
         };
         (0..SOURCE.rgb_bytes()).map(|_| next()).collect()
+    }
+
+    /// A lens whose focal lengths differ by some thousandths is scaled by as much when its picture is rotated.
+    #[test]
+    fn a_rotated_picture_of_two_focal_lengths_takes_one_sample_per_pixel() {
+        let (sin, cos) = f64::sin_cos(0.03);
+        for scale in [0.997, 1.0, 1.003] {
+            let map = [[scale * cos, -sin, 1.0], [scale * sin, cos, -1.0]];
+            let warp = Warp::new(SOURCE, SOURCE, &map, Fill::Black).unwrap();
+            assert!(matches!(warp.plan, Plan::Near(_)), "{scale}");
+        }
     }
 
     proptest! {
