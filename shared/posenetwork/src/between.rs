@@ -22,9 +22,12 @@ impl Tap {
         // The cell at or before the position. This computes `floor` for numbers of at least -1, also on processors without an instruction
         // for it.
         let lower = (cell + 1.0) as i64 - 1;
-        let first = lower - 1;
+        let mut cells = [0; 4];
+        for (cell, at) in cells.iter_mut().zip(lower - 1..) {
+            *cell = at.clamp(0, n as i64 - 1) as usize;
+        }
         Self {
-            cells: [0, 1, 2, 3].map(|i| (first + i).clamp(0, n as i64 - 1) as usize),
+            cells,
             weights: cubic((cell - lower as f64) as f32),
             is_inside,
         }
@@ -33,11 +36,12 @@ impl Tap {
 
 /// Interpolates a map between sixteen cells: first along each of four rows, then across the rows.
 pub(crate) fn between(map: &[f32], columns: usize, row: &Tap, column: &Tap) -> f32 {
-    let [a, b, c, d] = row.cells.map(|cell| {
-        let line = &map[cell * columns..(cell + 1) * columns];
-        column.along(line)
-    });
-    let [w_a, w_b, w_c, w_d] = row.weights;
+    // Loops over arrays are inlined here, unlike `map`.
+    let mut values = [0.0; 4];
+    for (value, cell) in values.iter_mut().zip(row.cells) {
+        *value = column.along(&map[cell * columns..][..columns]);
+    }
+    let ([a, b, c, d], [w_a, w_b, w_c, w_d]) = (values, row.weights);
     w_a * a + w_b * b + w_c * c + w_d * d
 }
 

@@ -31,7 +31,8 @@ impl MapGrid {
 
     /// Converts a point of the picture to cell coordinates, with fractions.
     pub fn cell(&self, point: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|axis| (point[axis] - self.first_px[axis]) / self.cell_px[axis])
+        let along = |axis: usize| (point[axis] - self.first_px[axis]) / self.cell_px[axis];
+        [along(0), along(1)]
     }
 
     /// Converts cell coordinates to a point of the picture, in pixels.
