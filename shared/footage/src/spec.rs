@@ -41,6 +41,8 @@ pub struct SourceSpec {
     /// The factor is the largest whole number up to this maximum that divides both sides of the pictures. Each pixel is the mean of the
     /// pixels that it covers. With 1, the pictures are not shrunk.
     pub most_shrink: usize,
+    /// Number of threads that decode a video; by default, the decoder chooses.
+    pub threads: Option<usize>,
     /// Minimum width and height of pictures before shrinking, in pixels.
     pub min_side: usize,
     /// The `ffmpeg` executable, a name on the search path or a path. Needed only for videos.
@@ -61,6 +63,7 @@ impl SourceSpec {
             numbers: None,
             rotation: Rotation::Stored,
             most_shrink: 1,
+            threads: None,
             min_side: 1,
             ffmpeg: "ffmpeg".into(),
             ffprobe: "ffprobe".into(),

@@ -51,6 +51,7 @@ impl Video {
             // Incomplete pictures are left out, because the decoder would otherwise make up the missing parts.
             .args(["-nostdin", "-v", "error", "-noautorotate"])
             .args(["-err_detect:v", "explode"])
+            .args(threads(spec))
             .args(input_options(path))
             .arg("-i")
             .arg(input_name(path))
@@ -264,6 +265,12 @@ fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
 /// Returns true if the decoder can report the times of frames.
 fn has_times(probe: &Probe) -> bool {
     probe.regular_hz().is_some() || probe.listed_s().is_some()
+}
+
+/// Returns the option that limits the threads of the decoder.
+fn threads(spec: &SourceSpec) -> Vec<String> {
+    let of_decoder = |n: usize| ["-threads".to_owned(), n.to_string()].to_vec();
+    spec.threads.map(of_decoder).unwrap_or_default()
 }
 
 /// Returns the options for the outputs of the decoder.
