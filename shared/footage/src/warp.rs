@@ -24,9 +24,9 @@ const MAX_SCALE: f64 = 64.0;
 /// Maximum translation, in pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
-/// Difference from a whole number of source pixels per output pixel that is ignored. The two focal lengths of a lens differ by less, so that
-/// a picture that is rotated and shrunk by a whole number takes as few samples as one that is only shrunk.
-pub const SCALE_TOLERANCE: f64 = 0.05;
+/// Maximum distance between samples, in source pixels. The two focal lengths of a lens differ by less than the excess, so that a picture that
+/// is only rotated takes one sample per pixel.
+const MOST_APART: f64 = 1.05;
 
 /// The value of pixels outside of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -124,7 +124,7 @@ impl Warp {
         } else if keeps_rows && a.abs() >= 1.0 && d.abs() >= 1.0 {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
-            let n_samples = scales.map(|scale| (scale - SCALE_TOLERANCE).ceil().max(1.0) as usize);
+            let n_samples = scales.map(|scale| (scale - MOST_APART + 1.0).ceil().max(1.0) as usize);
             let sizes = [source, output];
             let sampled = Sampled::new(sizes, source_from_output, n_samples, fill);
             Near::new(&sampled).map_or(Plan::Sampled(sampled), Plan::Near)
