@@ -66,6 +66,7 @@ impl InProcess {
             space: space_settings(resolved, &prepared),
             frame_rate_hz: resolved.frame_rate_hz(),
             most_apart: most_apart(resolved),
+            looks: deployment.network.looks,
         };
         Ok(Self {
             start_frame: deployment.capture.start_frame,

@@ -6,14 +6,14 @@ pub(crate) mod view_step;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use deployment::Stage;
+use deployment::{Stage, Topology};
 use failure::{ExitKind, Failure, OrFail as _};
-use footage::{SCALE_TOLERANCE, SourceSpec};
+use footage::SourceSpec;
 use geometry::Framing;
 use messages::topic;
-use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep};
+use pipeline::{ExtrasStep, FuseStep, LookBudget, SkeletonStep, SpaceStep};
 use rayon::ThreadPoolBuilder;
-use runtime::Service;
+use runtime::{Delivery, Service};
 use viewquality::Forecaster;
 
 use crate::find_every::FOLLOWED_S;
@@ -164,10 +164,12 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let deployment = &resolved.deployment;
     let rig = inputs::rig_of(deployment)?;
     let framing = framing(resolved, &rig, view)?;
+    let topology = resolved.topology();
     let job = capture::Job {
         view,
         source: SourceSpec {
             most_shrink: most_shrink(&framing),
+            threads: cores_each(&topology, Stage::Capture).map(|cores| cores.max(1.0) as usize),
             ..crate::cameras::source(&deployment.cameras[view], &deployment.capture)
         },
         timeline: resolved.footage[view].timeline,
@@ -179,11 +181,15 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         framing,
         mode: deployment.capture.mode,
         pace: deployment.capture.mode.pace(),
-        n_consumers: resolved.topology().receivers_of(&topic::frame(view)),
+        n_consumers: topology.receivers_of(&topic::frame(view)),
         patience: resolved.patience(),
     };
     capture::run(service, &job)
 }
+
+/// Difference from a whole factor that is ignored when a decoder shrinks pictures. The two focal lengths of a lens differ by less, so that
+/// a picture that is rotated afterwards is shrunk as far as a level one.
+const SCALE_TOLERANCE: f64 = 0.05;
 
 /// Returns the factor by which a decoder may shrink pictures that are scaled down to smaller frames.
 fn most_shrink(framing: &Framing) -> usize {
@@ -204,9 +210,32 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
         most_apart: most_apart(resolved),
+        looks: looks(resolved, &topology),
         patience: resolved.patience(),
     };
     pose::run(service, &job)
+}
+
+/// Returns the number of cores for each process of a stage on this machine; `None` if the number of cores is unknown.
+fn cores_each(topology: &Topology, stage: Stage) -> Option<f64> {
+    let cores = std::thread::available_parallelism().ok()?;
+    let processes = topology.processes().iter();
+    let n = processes.filter(|process| process.service == stage.name()).count();
+    Some(cores.get() as f64 / n.max(1) as f64)
+}
+
+/// Returns the limit for the runs of the network in a view. With `realtime` delivery, it is what the cores manage at the frame rate.
+fn looks(resolved: &Resolved, topology: &Topology) -> pose::Looks {
+    let deployment = &resolved.deployment;
+    if let Some(looks) = deployment.network.looks {
+        return pose::Looks::Fixed(looks);
+    }
+    let rate_hz = resolved.frame_rate_hz().filter(|_| resolved.delivery() == Delivery::Realtime);
+    let (Some(rate_hz), Some(per_view)) = (rate_hz, cores_each(topology, Stage::Pose)) else {
+        return pose::Looks::All;
+    };
+    let interval_s = deployment.capture.frame_step.max(1) as f64 / rate_hz;
+    pose::Looks::Affordable(LookBudget::new(per_view, interval_s))
 }
 
 /// Returns the largest number of frames between two frames in which the same person can be followed. With any `frame_step`, it is large
@@ -418,7 +447,7 @@ fn replay(
 mod tests {
     use std::path::Path;
 
-    use deployment::{AnyMachine, Loaded, RecordingPlan, Topology};
+    use deployment::{AnyMachine, Loaded, RecordingPlan};
     use geometry::OutSize;
 
     use super::*;

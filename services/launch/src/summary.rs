@@ -380,6 +380,7 @@ impl Report {
     fn write_slow(&self, text: &mut String, summary: &Summary) {
         let slow = slow::text(summary, self.n_frames, self.seconds, self.is_lossless);
         text.extend(slow);
+        text.extend(slow::predicted(summary));
     }
 
     fn write_live(&self, text: &mut String) {

@@ -148,6 +148,20 @@ mod long {
         assert!(error < 0.075 && share > 0.85, "{error} m, {share}");
     }
 
+    /// Simulates a machine that has time for half of the people.
+    #[test]
+    fn who_is_not_looked_at_in_every_frame_is_predicted() {
+        let case = case("predicted", "walking", 30);
+        run(&case, &["--set", "network.looks=0.6"]);
+        let (error, share) = judged(&case, &Isometry3::identity());
+        assert!(error < 0.03 && share > 0.95, "{error} m, {share}");
+        let summary = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
+        let summary: Value = serde_json::from_str(&summary).unwrap();
+        let [all, predicted] = ["sightings", "sightings_predicted"]
+            .map(|key| summary["summary"][key].as_u64().unwrap());
+        assert!(predicted * 4 > all, "{predicted} of {all}");
+    }
+
     /// Simulates a slow machine: frames are far apart, and few of them are searched.
     #[test]
     fn who_runs_is_followed_over_half_a_second_without_a_search() {

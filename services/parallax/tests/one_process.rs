@@ -4,6 +4,7 @@
 use footage::Canvas;
 use kernels::Rgb8View;
 use keypoints::HALPE_26;
+use serde_json::Value;
 
 use crate::common::Case;
 use crate::common::same_bits::assert_same_skeleton;
@@ -75,6 +76,21 @@ fn many_processes_give_the_bits_of_one() {
     let case = case("one-process", named.map(Some));
     run_as_they_are(&case);
     assert_one_process_gives_the_same(&case, &pictures(named));
+}
+
+#[test]
+fn many_processes_give_the_bits_of_one_where_people_are_predicted() {
+    let case = case("one-predicted", [Some(as_it_is); 4]);
+    case.set_network("file = \"net.onnx\"\ndetector = \"det.onnx\"\nlooks = 0.6");
+    let file = case.path("deployment.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    case.write("deployment.toml", format!("{text}\n[capture]\nframe_rate_hz = 30.0\n"));
+    run_as_they_are(&case);
+    let summary = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let predicted = summary["summary"]["sightings_predicted"].as_u64().unwrap();
+    assert!(predicted > N_FRAMES as u64, "{predicted}");
+    assert_one_process_gives_the_same(&case, &pictures([as_it_is; 4]));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Searches a frame with a network that finds keypoints.
 
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, now_nanos, processor_nanos};
 use kernels::Rgb8View;
 use messages::{Searched, Stamp, Status, ViewPose};
 use pipeline::{NetworkMemory, NetworkStep};
@@ -17,8 +17,15 @@ impl View<'_> {
         (image, stamp): (Rgb8View<'_>, Stamp),
         state: &mut NetworkState,
     ) -> Result<Result<Found<'_>, Status>, Failure> {
-        state.memory.begin(stamp.frame, self.job.most_apart);
-        if let Err(error) = step.look(image, &mut state.memory) {
+        state.begin(stamp.frame, self.job);
+        let began = [processor_nanos(), now_nanos()];
+        let result = step.look(image, &mut state.memory);
+        if let Some(budget) = &mut state.budget {
+            let ended = [processor_nanos(), now_nanos()];
+            let times_s = [0, 1].map(|clock| (ended[clock] - began[clock]) as f64 * 1e-9);
+            budget.spent(state.memory.n_looks(), times_s);
+        }
+        if let Err(error) = result {
             if !state.has_failed {
                 let error = failure::wording::in_one_line(&error);
                 tracing::warn!(frame = stamp.frame, error, "the network failed on a frame");

@@ -5,7 +5,7 @@ use core::time::Duration;
 use deployment::Timeline;
 use keypoints::files::SeenKeypoints;
 use keypoints::keypointfiles::{KeypointFileError, KeypointSource};
-use pipeline::{NetworkStep, ViewStep};
+use pipeline::{LookBudget, NetworkStep, ViewStep};
 
 /// Keypoints that another program found in the footage of a view.
 #[derive(Debug)]
@@ -75,6 +75,17 @@ impl Step {
     }
 }
 
+/// Limit for the runs of the network in one view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Looks {
+    /// The network runs on every person in every frame.
+    All,
+    /// Number of runs per frame, on average.
+    Fixed(f64),
+    /// As many as the cores manage at the frame rate.
+    Affordable(LookBudget),
+}
+
 /// The settings of the process of one view.
 #[derive(Debug)]
 pub struct Job {
@@ -96,6 +107,8 @@ pub struct Job {
     pub frame_rate_hz: Option<f64>,
     /// For `Network`: largest gap between two frames over which people can be followed, in frames of the footage.
     pub most_apart: Option<f64>,
+    /// Limit for the runs of the network.
+    pub looks: Looks,
     /// Time that the process waits for receivers.
     pub patience: Duration,
 }

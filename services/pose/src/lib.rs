@@ -9,6 +9,6 @@ mod service;
 mod settings;
 mod view;
 
-pub use job::{Job, Keypoints, Source, Step};
+pub use job::{Job, Keypoints, Looks, Source, Step};
 pub use service::run;
 pub use settings::settings;

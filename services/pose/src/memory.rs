@@ -3,7 +3,9 @@
 use fmp::Tracker;
 use keypoints::files::SeenKeypoints;
 use messages::Stamp;
-use pipeline::NetworkMemory;
+use pipeline::{LookBudget, NetworkMemory};
+
+use crate::job::{Job, Looks};
 
 /// State that is kept from frame to frame.
 pub(crate) enum Memory {
@@ -20,6 +22,8 @@ const LONG_NANOS: u64 = 60_000_000_000;
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
+    /// What the cores manage, if runs of the network are limited by it.
+    pub(crate) budget: Option<LookBudget>,
     /// Time of the last person or the last warning, and number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
     /// True if a failure of the network was reported.
@@ -27,6 +31,27 @@ pub(crate) struct NetworkState {
 }
 
 impl NetworkState {
+    pub(crate) fn new(looks: Looks) -> Self {
+        Self {
+            budget: match looks {
+                Looks::Affordable(budget) => Some(budget),
+                Looks::All | Looks::Fixed(_) => None,
+            },
+            ..Self::default()
+        }
+    }
+
+    /// Begins a frame, and limits the runs of the network in it.
+    pub(crate) fn begin(&mut self, frame: u64, job: &Job) {
+        self.memory.begin(frame, job.most_apart);
+        self.memory.allow(match job.looks {
+            Looks::Fixed(looks) => Some(looks),
+            Looks::All | Looks::Affordable(_) => {
+                self.budget.as_ref().and_then(LookBudget::looks)
+            }
+        });
+    }
+
     /// Warns if nobody has been seen for a minute.
     pub(crate) fn sees(&mut self, is_somebody: bool, stamp: &Stamp) {
         let now = stamp.captured_at_nanos;

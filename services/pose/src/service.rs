@@ -6,7 +6,7 @@ use runtime::Service;
 use stage::{Range, Stage};
 
 use crate::job::{Job, Step};
-use crate::memory::Memory;
+use crate::memory::{Memory, NetworkState};
 use crate::view::View;
 
 /// Searches every frame of one view, until the footage ends or a stop is requested.
@@ -24,7 +24,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     };
     let mut memory = match &job.step {
         Step::Filters(step) => Memory::Filters(step.tracker(), Vec::new()),
-        Step::Network(_) => Memory::Network(Box::default()),
+        Step::Network(_) => Memory::Network(Box::new(NetworkState::new(job.looks))),
         Step::Keypoints(_) => Memory::Keypoints(Box::default()),
     };
     let range = Range {

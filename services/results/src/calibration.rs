@@ -232,6 +232,7 @@ mod tests {
             front: [0.0; 2],
             extras: Vec::new(),
             colour: None,
+            age_s: 0.0,
         };
         record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
         assert_eq!(parts(&maps, &record, 0).unwrap().len(), skeleton::N_PARTS);

@@ -131,6 +131,10 @@ impl Tally {
             let summary = &mut self.summary;
             let of_view = summary.searches.entry(view.name.clone()).or_default();
             *of_view.entry(pose.searched.name().to_owned()).or_default() += 1;
+            let ages_s = pose.ages_s.iter().take(pose.n_candidates as usize);
+            summary.sightings += ages_s.len() as u64;
+            let predicted = ages_s.filter(|age_s| **age_s > 0.0).count();
+            summary.sightings_predicted += predicted as u64;
             let mean = *bytes / *n;
             summary.evidence_bytes_per_frame.insert(view.name.clone(), mean);
         }

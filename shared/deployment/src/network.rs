@@ -24,6 +24,9 @@ pub struct Config {
     pub least_heat: f64,
     /// Maximum number of people in a view, and in a frame.
     pub people: usize,
+    /// Mean number of runs of the network per frame and view, where people who are left out are predicted; by default, the network runs on
+    /// everybody or, in `realtime` mode, as often as the cores manage.
+    pub looks: Option<f64>,
     /// Average the results of each person's picture and its mirror image; this is more accurate, but takes twice as long.
     pub mirror: bool,
     /// ONNX Runtime library (`libonnxruntime.so`) that runs the network and the detector instead of the built-in runtime.
@@ -38,6 +41,7 @@ impl Default for Config {
             find_every: None,
             least_heat: 0.2,
             people: 4,
+            looks: None,
             mirror: false,
             onnx_runtime: None,
         }

@@ -17,7 +17,7 @@ const MOST_FRAMES: f64 = 1e12;
 /// limits the length of the list.
 ///
 /// The ranges of whole numbers are also given as `f64`, which represents all of them exactly.
-pub(crate) const RANGES: [(&str, f64, f64); 26] = [
+pub(crate) const RANGES: [(&str, f64, f64); 27] = [
     ("capture.size", 1.0, 16_384.0),
     ("capture.scale", 0.001, 8.0),
     ("capture.frame_rate_hz", 0.001, 1e5),
@@ -27,6 +27,7 @@ pub(crate) const RANGES: [(&str, f64, f64); 26] = [
     ("paper.candidates", 1.0, MAX_CANDIDATES as f64),
     ("network.find_every", 1.0, 1e6),
     ("network.least_heat", 0.0, 1.0),
+    ("network.looks", 0.1, 1000.0),
     ("network.people", 1.0, MAX_CANDIDATES as f64),
     ("runtime.threads", 1.0, 256.0),
     ("paper.alpha", 0.0, 1e6),

@@ -1,4 +1,4 @@
-//! The clock that all processes of a deployment share.
+//! The clock that all processes of a deployment share, and the processor time of one of them.
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -6,4 +6,10 @@ use rustix::time::{ClockId, clock_gettime};
 pub fn now_nanos() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// Returns the processor time that this process has used so far, in nanoseconds.
+pub fn processor_nanos() -> u64 {
+    let used = clock_gettime(ClockId::ProcessCPUTime);
+    used.tv_sec as u64 * 1_000_000_000 + used.tv_nsec as u64
 }

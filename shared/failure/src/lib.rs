@@ -14,7 +14,7 @@ mod stop;
 pub mod wording;
 
 pub use claim::{Claim, check_claim};
-pub use clock::now_nanos;
+pub use clock::{now_nanos, processor_nanos};
 pub use command::{DEFECT, log_panics, panic_text, run_command};
 pub use console::{Console, Silent};
 pub use failure::{ExitKind, Failure, Fault, OrFail, require_results};

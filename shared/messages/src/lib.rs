@@ -63,7 +63,7 @@ const _: () = {
     assert!(size_of::<LocalMessage>() == 12);
     assert!(
         size_of::<ViewPose>()
-            == 1880 + MAX_CANDIDATES * (MAX_JOINTS + 1) * 12 + MAX_VIEW_KEYPOINTS * 12
+            == 1912 + MAX_CANDIDATES * (MAX_JOINTS + 1) * 12 + MAX_VIEW_KEYPOINTS * 12
     );
     assert!(size_of::<PersonMessage>() == 24);
     assert!(size_of::<People>() == 64 + MAX_PEOPLE * 24);

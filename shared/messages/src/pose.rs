@@ -68,7 +68,7 @@ pub const NO_COLOUR: [f32; 3] = [-1.0; 3];
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v9")]
+#[type_name("ViewPose.v10")]
 #[repr(C)]
 pub struct ViewPose {
     /// Identity of the frame and the view.
@@ -106,6 +106,9 @@ pub struct ViewPose {
     pub heats: [[f32; MAX_JOINTS]; MAX_CANDIDATES],
     /// Median colour of the trunk of every candidate: red, green and blue from 0 to 1, or [`NO_COLOUR`]. Used by the network method only.
     pub colours: [[f32; 3]; MAX_CANDIDATES],
+    /// Time since the network last ran on every candidate, in seconds; above 0 for people who were left out to save time. Used by the network
+    /// method only.
+    pub ages_s: [f32; MAX_CANDIDATES],
     /// The extra keypoints of one candidate after the other, for as many candidates as fit:
     /// `[column, row, standard deviation along one axis]`, in pixels of the frame. The deviation is 0 for a keypoint that was not found.
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],

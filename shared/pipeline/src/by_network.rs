@@ -26,6 +26,8 @@ pub struct NetworkEstimatorSettings {
     pub frame_rate_hz: Option<f64>,
     /// Number of frames after which people may have left their boxes.
     pub most_apart: Option<f64>,
+    /// Number of runs of the network per frame and view, on average; `None` for no limit.
+    pub looks: Option<f64>,
 }
 
 /// One view of a frame.
@@ -111,11 +113,11 @@ impl NetworkEstimator {
         frame: u64,
         frames: &[Option<ViewFrame<'_>>],
     ) -> Result<NetworkEstimate, LookError> {
-        let most_apart = self.settings.most_apart;
+        let settings = &self.settings;
         let viewed = self.views.par_iter_mut().zip(frames);
         let sightings: Result<Vec<Option<Sightings>>, LookError> = viewed
             .map(|(view, content)| match content {
-                Some(content) => view.look(frame, most_apart, content),
+                Some(content) => view.look(frame, settings, content),
                 None => Ok(None),
             })
             .collect();
@@ -141,12 +143,13 @@ impl View {
     fn look(
         &mut self,
         frame: u64,
-        most_apart: Option<f64>,
+        settings: &NetworkEstimatorSettings,
         content: &ViewFrame<'_>,
     ) -> Result<Option<Sightings>, LookError> {
         match content.content {
             ViewContent::Picture(image) => {
-                self.memory.begin(frame, most_apart);
+                self.memory.begin(frame, settings.most_apart);
+                self.memory.allow(settings.looks);
                 self.step.look(image, &mut self.memory)?;
             }
             ViewContent::Keypoints(people) => self.step.take(people.iter(), &mut self.memory),

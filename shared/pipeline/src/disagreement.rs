@@ -95,19 +95,23 @@ fn nearest(
     let camera = found_by.plans[view].camera();
     let [width, height] = camera.intrinsics.size.map(f64::from);
     let inside = |at: &Point2<f64>| (0.0..width).contains(&at.x) && (0.0..height).contains(&at.y);
-    let mut projected: Vec<Option<Point2<f64>>> = joints
+    let projected: Vec<Option<Point2<f64>>> = joints
         .iter()
         .map(|joint| camera.project(&joint.as_ref().ok()?.in_world).filter(inside))
         .collect();
     // A picture taken at another time shows the joints elsewhere.
-    if let Some(by) = motion.since_instant(view, [answer.skew_s, 0.0], projected.clone()) {
-        for (at, by) in projected.iter_mut().zip(by) {
+    let mut shown_at = |skew_s: f64| {
+        let by = motion.since_instant(view, [skew_s, 0.0], projected.clone());
+        let mut shown = projected.clone();
+        for (at, by) in shown.iter_mut().zip(by.into_iter().flatten()) {
             *at = at.map(|at| at + by);
         }
-    }
+        shown
+    };
     readings(found_by, view, answer)
-        .map(|points| {
-            let both = projected.iter().zip(&points);
+        .map(|(age_s, points)| {
+            let shown = shown_at(answer.skew_s - age_s);
+            let both = shown.iter().zip(&points);
             let distance = |(at, point): (&Option<Point2<f64>>, &[f64; 2])| {
                 at.map_or(f64::NAN, |at| (at - Point2::from(*point)).norm())
             };
@@ -152,19 +156,23 @@ fn median(values: &[f64]) -> Option<f64> {
     known.get(known.len() / 2).copied()
 }
 
-/// Returns the joints of all candidates of a view, both with left and right as labelled and with them swapped.
+/// Returns the joints of all candidates of a view, both with left and right as labelled and with them swapped, and the time since the
+/// network saw them, in seconds.
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,
     answer: &'a Sightings,
-) -> impl Iterator<Item = Vec<[f64; 2]>> + 'a {
+) -> impl Iterator<Item = (f64, Vec<[f64; 2]>)> + 'a {
     let has_part = found_by.takes_part.get(view) == Some(&true);
     let least_heat = found_by.least_heat;
     let joints = found_by.joints;
     let seen = answer.people.iter();
     let seen = seen.filter(move |sighting| has_part || sighting.is_clear(least_heat));
     let each = seen.flat_map(|sighting| [(sighting, false), (sighting, true)]);
-    each.map(move |(sighting, is_exchanged)| sighting.joints_of_set(joints, is_exchanged))
+    each.map(move |(sighting, is_exchanged)| {
+        let age_s = f64::from(sighting.age_s);
+        (age_s, sighting.joints_of_set(joints, is_exchanged))
+    })
 }
 
 fn sum(distances: &[f64]) -> f64 {

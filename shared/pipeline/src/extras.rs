@@ -51,6 +51,8 @@ pub struct ExtrasStep {
 
 /// The person's candidate in a view.
 struct Match {
+    /// Time since the network ran on the person, in seconds.
+    age_s: f64,
     view: usize,
     /// The extra keypoints, moved to the instant of the frame.
     extras: Vec<ExtraKeypoint>,
@@ -98,7 +100,7 @@ impl ExtrasStep {
             .filter_map(|(view, (found, fused))| {
                 let found = found.as_ref()?;
                 let mut it = self.person(view, found, fused.as_ref()?)?;
-                it.move_to_instant(found.skew_s, motion);
+                it.move_to_instant(found.skew_s - it.age_s, motion);
                 Some(it)
             })
             .collect();
@@ -124,13 +126,14 @@ impl ExtrasStep {
         let told = told.filter(|sighting| sighting.extras.len() == self.extras.len());
         let of_candidate = told.map(|sighting| {
             let own = sighting.places(false).to_vec();
-            (middle_distance(&own, &joints), own, &sighting.extras)
+            (middle_distance(&own, &joints), own, sighting)
         });
         let nearest = of_candidate.min_by(|a, b| a.0.total_cmp(&b.0));
-        let (distance, own, extras) = nearest?;
+        let (distance, own, sighting) = nearest?;
         (distance < SAME * longer_px).then_some(Match {
             view,
-            extras: extras.clone(),
+            extras: sighting.extras.clone(),
+            age_s: sighting.age_s.into(),
             joints: [own, joints],
             longer_px,
         })

@@ -13,6 +13,7 @@ mod following;
 mod fuse_step;
 mod fused;
 mod fused_view;
+mod look_budget;
 mod looks;
 mod motion;
 mod network_memory;
@@ -45,6 +46,7 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
+pub use look_budget::LookBudget;
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
 pub use network_step::{Eyes, NetworkSettings, NetworkStep, most_values};

@@ -3,7 +3,7 @@
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, Look, LookError, Looker, Turn, outline_of, overlap};
 
-use crate::network_memory::{Empty, NetworkMemory, Seen, is_known, shift};
+use crate::network_memory::{Empty, NetworkMemory, SEARCH, Seen, is_known, shift};
 use crate::tracks::{Pace, Track, moved, wider};
 
 /// Overlap of two boxes above which they show the same person.
@@ -95,6 +95,43 @@ impl Looks<'_> {
                 && let Some(before) = before.get_mut(track.index)
             {
                 track.is_seen = self.hold(track, n_frames, before, memory);
+            }
+        }
+    }
+
+    /// Reuses the last sightings of the people for whom no runs are left in this frame. The network runs on the people who may have moved
+    /// farthest since it last ran on them.
+    ///
+    /// * `before`: the people of the previous frame; the entries of the reused people are overwritten.
+    pub(crate) fn hold_to_save(
+        &self,
+        tracks: &mut [Track],
+        before: &mut [Seen],
+        memory: &mut NetworkMemory,
+    ) {
+        let hold = memory.hold.filter(|_| memory.is_followed());
+        let (Some(credit), Some(hold)) = (memory.credit, hold) else {
+            return;
+        };
+        let credit = credit - if memory.has_searched { SEARCH } else { 0.0 };
+        let mut unseen: Vec<usize> = (0..tracks.len()).filter(|nth| !tracks[*nth].is_seen).collect();
+        let doubt = |nth: &usize| tracks[*nth].doubt(tracks[*nth].n_held + hold.gap);
+        unseen.sort_by(|a, b| doubt(b).total_cmp(&doubt(a)));
+        for nth in unseen.into_iter().skip(credit.max(0.0) as usize) {
+            let track = &mut tracks[nth];
+            let n_frames = track.n_held + hold.gap;
+            let Some(before) = before.get_mut(track.index).filter(|_| n_frames <= hold.most_to_save)
+            else {
+                continue;
+            };
+            track.is_seen = self.hold(track, n_frames, before, memory);
+            if track.is_seen {
+                let newest = memory.n_seen - 1;
+                let seen = &mut memory.seen[newest];
+                seen.age = n_frames;
+                let [_, top, _, bottom] = seen.maps.extent();
+                let window_px = bottom - top;
+                seen.next = seen.next.map(|track| track.moved_on(hold.gap, window_px));
             }
         }
     }
@@ -239,6 +276,7 @@ impl Looks<'_> {
         let (_, seen) = memory.next();
         core::mem::swap(seen, before);
         seen.next = Some(Track { n_held, ..*track });
+        seen.age = 0;
         let is_new = !is_known(&memory.seen, memory.n_seen);
         if is_new {
             memory.n_seen += 1;

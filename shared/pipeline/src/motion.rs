@@ -18,12 +18,23 @@ pub(crate) struct AtInstant {
     pub(crate) more_px: Vec<Vec<f64>>,
 }
 
+/// Times that differ by less are of one picture, in seconds.
+const SAME_PICTURE_S: f64 = 1e-4;
+
 /// Motion of the points of every view from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub struct Motion {
-    views: Vec<Tracks>,
+    views: Vec<Moving>,
     /// Instant of the frame, in seconds.
     instant_s: Option<f64>,
+}
+
+/// Motion of the points of one view.
+#[derive(Debug, Clone, Default)]
+struct Moving {
+    tracks: Tracks,
+    /// Time of the last points, in seconds, and their velocities.
+    last: Option<(f64, Vec<Option<Velocity>>)>,
 }
 
 impl Motion {
@@ -79,21 +90,25 @@ impl Motion {
     }
 
     /// Returns the displacement of the points of a view between the instant of the frame and the time of the picture, in pixels;
-    /// `None` if the picture was taken at the instant.
+    /// `None` if the picture was taken at the instant. No point is moved by more than it moved between the last two pictures.
     ///
-    /// * `skew_s`, `taken_s`: time of the picture and time of the points, both in seconds after the instant.
+    /// * `skew_s`, `taken_s`: time of the picture and time of the points, both in seconds after the instant. Points of the same picture can
+    ///   be given again in a later frame.
     pub(crate) fn since_instant(
         &mut self,
         view: usize,
         [skew_s, taken_s]: [f64; 2],
         points: Points,
     ) -> Option<Vec<Vector2<f64>>> {
-        let instant_s = self.instant_s.filter(|_| skew_s != 0.0)?;
+        let instant_s = self.instant_s?;
         let height_px = height(&points);
         let velocities = self.velocities(view, instant_s + taken_s, points, height_px);
+        if skew_s == 0.0 {
+            return None;
+        }
         let by = |velocity: Option<Velocity>| {
             velocity
-                .and_then(|velocity| velocity.shift(skew_s))
+                .and_then(|velocity| velocity.shift(skew_s.clamp(-velocity.gap_s, velocity.gap_s)))
                 .unwrap_or_else(Vector2::zeros)
         };
         Some(velocities.into_iter().map(by).collect())
@@ -108,14 +123,20 @@ impl Motion {
         height_px: f64,
     ) -> Vec<Option<Velocity>> {
         if self.views.len() <= view {
-            self.views.resize_with(view + 1, Tracks::default);
+            self.views.resize_with(view + 1, Moving::default);
         }
-        let tracks = &mut self.views[view];
+        let Moving { tracks, last } = &mut self.views[view];
+        if let Some((last_s, velocities)) = last
+            && (taken_s - *last_s).abs() < SAME_PICTURE_S
+        {
+            return velocities.clone();
+        }
         let of_point = |(nth, at): (usize, &Option<Point2<f64>>)| {
             tracks.velocity(nth, (taken_s, (*at)?), height_px)
         };
-        let velocities = points.iter().enumerate().map(of_point).collect();
+        let velocities: Vec<Option<Velocity>> = points.iter().enumerate().map(of_point).collect();
         tracks.note(taken_s, points);
+        *last = Some((taken_s, velocities.clone()));
         velocities
     }
 }
@@ -173,6 +194,25 @@ mod tests {
         );
         assert_eq!((more[0][0], more[2].len()), (0.0, 0));
         assert!(more[1][0] > 1.0);
+    }
+
+    #[test]
+    fn points_that_were_seen_some_frames_ago_move_on_with_their_last_velocity() {
+        let mut motion = Motion::default();
+        let points = |x: f64| vec![Some(Point2::new(x, 0.0)), Some(Point2::new(x, 200.0))];
+        let mut since = |instant_s: f64, age_s: f64, x: f64| {
+            motion.begin(Some(instant_s));
+            let by = motion.since_instant(0, [-age_s; 2], points(x))?;
+            Some(by[0].x)
+        };
+        assert_eq!(since(1.0, 0.0, 10.0), None);
+        assert_eq!(since(1.1, 0.0, 20.0), None);
+        // The same points again: they are 10 px behind.
+        let again = since(1.2, 0.1, 20.0).unwrap();
+        assert!((again + 10.0).abs() < 1e-6, "{again}");
+        let later = since(1.3, 0.2, 20.0).unwrap();
+        assert!((later + 10.0).abs() < 1e-6, "no farther than seen: {later}");
+        assert_eq!(since(1.4, 0.0, 50.0), None);
     }
 
     #[test]

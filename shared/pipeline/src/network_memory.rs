@@ -23,6 +23,13 @@ const LOOKED_AGAIN: u32 = 4;
 /// After this multiple of the maximum gap between frames (2 s in total), a person may be anywhere.
 pub const LOST: f64 = 5.0;
 
+/// Cost of a search for boxes, in runs of the network.
+pub(crate) const SEARCH: f64 = 1.0;
+/// Maximum number of runs that a view may use in advance.
+const MOST_DEBT: f64 = 4.0;
+/// Time for which a person is not looked at to save runs, at most, as a fraction of the maximum gap between frames (0.2 s).
+const UNSEEN: f64 = 0.5;
+
 /// State of the step from frame to frame: reusable memory, and the boxes of the people seen.
 #[derive(Debug, Default)]
 pub struct NetworkMemory {
@@ -56,6 +63,10 @@ pub struct NetworkMemory {
     pub(crate) apart: Option<f64>,
     /// True if this frame was searched for people.
     pub(crate) has_searched: bool,
+    /// Number of runs of the network that are left; negative if too many were used. `None` if there is no limit.
+    pub(crate) credit: Option<f64>,
+    /// Number of runs of the network in the last frame; a search counts as [`SEARCH`] runs.
+    pub(crate) n_looks: f64,
 }
 
 /// How long the last sighting of a person who stands still can be reused.
@@ -63,8 +74,10 @@ pub struct NetworkMemory {
 pub(crate) struct Hold {
     /// Number of frames from the last frame to this frame.
     pub(crate) gap: u64,
-    /// Maximum number of frames between two runs of the network on a person.
+    /// Maximum number of frames between two runs of the network on a person who stands still.
     pub(crate) most: u64,
+    /// The same, if runs must be saved.
+    pub(crate) most_to_save: u64,
 }
 
 /// A box of the detector in which nobody was found.
@@ -81,6 +94,8 @@ pub(crate) struct Empty {
 pub(crate) struct Seen {
     /// Where to look for the person next; `None` if the network has just run on the person.
     pub(crate) next: Option<Track>,
+    /// Number of frames since the network last ran on the person, if the person was left out to save runs; otherwise 0.
+    pub(crate) age: u64,
     /// Velocity of the person, as in [`Track`].
     pub(crate) pace: Option<Pace>,
     pub(crate) maps: JointMaps,
@@ -179,6 +194,7 @@ impl NetworkMemory {
         self.hold = apart.zip(most_apart).map(|(gap, most)| Hold {
             gap,
             most: (HELD * most) as u64,
+            most_to_save: ((UNSEEN * most) as u64).max(gap),
         });
         self.apart = share.filter(|share| *share > 1.0);
         if share.is_some_and(|share| share > LOST) && !self.has_searched {
@@ -188,9 +204,32 @@ impl NetworkMemory {
         self.last = Some(frame);
     }
 
-    /// Returns true if this frame must be searched for boxes, even if people are seen.
+    /// Limits the number of runs of the network. Runs that a frame does not use are left for the next frame; runs beyond the limit are
+    /// taken from later frames.
+    ///
+    /// * `looks`: number of runs per frame, on average; `None` for no limit.
+    pub fn allow(&mut self, looks: Option<f64>) {
+        self.credit = looks.map(|looks| {
+            let left = self.credit.unwrap_or(0.0).clamp(-MOST_DEBT, looks.max(1.0));
+            left + looks
+        });
+    }
+
+    /// Returns the number of runs of the network in the last frame, for [`LookBudget::spent`](crate::LookBudget::spent).
+    pub fn n_looks(&self) -> f64 {
+        self.n_looks
+    }
+
+    /// Takes note of the runs of a frame.
+    pub(crate) fn spend(&mut self, n_runs: u64) {
+        self.n_looks = n_runs as f64 + if self.has_searched { SEARCH } else { 0.0 };
+        self.credit = self.credit.map(|credit| credit - self.n_looks);
+    }
+
+    /// Returns true if this frame must be searched for boxes, even if people are seen. A search waits until there are runs left.
     pub(crate) fn is_due(&self) -> bool {
-        self.until.is_none_or(|until| until == 0)
+        let is_affordable = self.credit.is_none_or(|credit| credit > 0.0);
+        self.until.is_none_or(|until| until == 0 && is_affordable)
     }
 
     /// Returns true if this frame was searched for boxes.
@@ -204,7 +243,7 @@ impl Seen {
     ///
     /// * `size`: width and height of the frame; `least_heat`: minimum mean heat of the joints of a clearly visible person, 0 to 1.
     pub(crate) fn judge(&mut self, size: [usize; 2], least_heat: f64) -> bool {
-        self.next = None;
+        (self.next, self.age) = (None, 0);
         self.heat = self.maps.heat();
         self.heat >= least_heat && self.maps.overlaps(size)
     }
@@ -353,6 +392,24 @@ mod tests {
         assert_eq!(hold(Some(12.0), [3, 5]), Some((2, 4)), "30 Hz");
         assert_eq!(hold(Some(2.0), [3, 4]), Some((1, 0)), "5 Hz");
         assert_eq!(hold(None, [3, 4]), None);
+    }
+
+    #[test]
+    fn runs_that_are_left_are_kept_for_the_next_frame_and_no_longer() {
+        let mut memory = NetworkMemory::default();
+        let mut left = |looks: Option<f64>, n_runs: u64| {
+            memory.allow(looks);
+            let credit = memory.credit;
+            memory.spend(n_runs);
+            credit
+        };
+        assert_eq!(left(Some(1.5), 0), Some(1.5));
+        assert_eq!(left(Some(1.5), 1), Some(3.0));
+        assert_eq!(left(Some(1.5), 0), Some(3.0), "no more than two frames' runs");
+        assert_eq!(left(Some(1.5), 20), Some(3.0));
+        assert_eq!(left(Some(1.5), 0), Some(-2.5), "a limited debt");
+        assert_eq!(left(None, 3), None);
+        assert_eq!(left(Some(1.5), 0), Some(1.5));
     }
 
     #[test]

@@ -41,6 +41,8 @@ pub struct NetworkSettings {
     /// Number of frames by which the second regular search comes early. With different values for different views, the views do not all
     /// search in the same frame.
     pub find_phase: u64,
+    /// Time between two frames of the footage, in seconds; 0 if unknown.
+    pub frame_s: f64,
     /// Minimum mean heat of the joints of a clearly visible person, 0 to 1.
     pub least_heat: f64,
     /// Settings that control how maps are turned into evidence.
@@ -56,6 +58,7 @@ impl Default for NetworkSettings {
             find_every: 10,
             find_every_of_several: 10,
             find_phase: 0,
+            frame_s: 0.0,
             least_heat: 0.2,
             maps: MapSettings::default(),
             keypoint_sigma: 0.02,
@@ -120,6 +123,7 @@ impl NetworkStep {
     /// [`LookError`] if the network or the detector fails or returns numbers that are not finite.
     pub fn look(&self, image: Rgb8View<'_>, memory: &mut NetworkMemory) -> Result<(), LookError> {
         memory.n_seen = 0;
+        memory.n_looks = 0.0;
         let Eyes::Network(network, detector) = &self.eyes else {
             return Ok(());
         };
@@ -139,7 +143,9 @@ impl NetworkStep {
             most_lost: self.most_lost(),
         };
         memory.has_searched = is_due;
+        let n_runs = memory.look.workspace().n_runs();
         looks.hold_still(&mut tracks, &mut before, memory);
+        looks.hold_to_save(&mut tracks, &mut before, memory);
         if is_due {
             let found = find(detector, image, &mut memory.values)?;
             looks.see_boxes(&of_others(found, memory.people()), memory)?;
@@ -152,9 +158,12 @@ impl NetworkStep {
             let found = find(detector, image, &mut memory.values)?;
             looks.see_boxes(&found, memory)?;
         }
+        let n_runs = memory.look.workspace().n_runs() - n_runs;
+        memory.spend(n_runs);
         memory.before = before;
         memory.keep_largest(self.settings.n_people);
-        for seen in &mut memory.seen[..memory.n_seen] {
+        let n_seen = memory.n_seen;
+        for seen in memory.seen[..n_seen].iter_mut().filter(|seen| seen.age == 0) {
             seen.colour = trunk_colour(image, &Sighting::new(seen.maps.peaks(), 0.0).joints);
         }
         if memory.n_seen == 0 {
@@ -172,7 +181,9 @@ impl NetworkStep {
     fn plan_search(&self, memory: &mut NetworkMemory) {
         let settings = &self.settings;
         let first = settings.find_every - settings.find_phase % settings.find_every;
-        let every = if memory.n_seen > 1 && memory.is_unsettled() {
+        // Frequent searches leave too few runs for the people who are known.
+        let is_limited = memory.credit.is_some();
+        let every = if memory.n_seen > 1 && memory.is_unsettled() && !is_limited {
             settings.find_every_of_several
         } else {
             settings.find_every
@@ -242,6 +253,7 @@ impl NetworkStep {
                 front: front_of(&sighting, seen),
                 extras: self.extras_of(&seen.maps).collect(),
                 colour: seen.colour,
+                age_s: (seen.age as f64 * self.settings.frame_s) as f32,
                 ..sighting
             });
         }

@@ -166,7 +166,8 @@ impl PersonStep {
             };
             let found = sighting.places(false).map(Point2::from);
             let found = found.map(|at| Some(at).filter(|at| at.x.is_finite()));
-            if let Some(by) = self.seen.since_instant(view, [answer.skew_s; 2], found.to_vec()) {
+            let skew_s = answer.skew_s - f64::from(sighting.age_s);
+            if let Some(by) = self.seen.since_instant(view, [skew_s; 2], found.to_vec()) {
                 evidence.move_to_instant(by);
             }
             shown.push(Shown {

@@ -26,6 +26,8 @@ pub struct Sighting {
     pub extras: Vec<ExtraKeypoint>,
     /// Median red, green and blue of the trunk, 0 to 1; `None` if the trunk is not seen, or if there is no picture.
     pub colour: Option<[f32; 3]>,
+    /// Time since the network last ran on the person, in seconds. It is above 0 if the person was left out to save time.
+    pub age_s: f32,
 }
 
 /// The people that one view sees in a frame.
@@ -53,6 +55,7 @@ impl Sighting {
             front: FrontEvidence::default(),
             extras: Vec::new(),
             colour: None,
+            age_s: 0.0,
         }
     }
 

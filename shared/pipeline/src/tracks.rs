@@ -23,6 +23,9 @@ const MOST_STEP: f64 = 3.0;
 /// standing person.
 const KEPT: f64 = 0.7;
 
+/// Motion of the limbs of a person whose trunk stands still, per frame, as a fraction of the height of the network's window.
+const LIMBS: f64 = 0.02;
+
 /// Where to look for a person in the next frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Track {
@@ -114,6 +117,26 @@ impl Track {
         }
     }
 
+    /// Returns how far the person may have moved since the last run of the network, as a fraction of the height of the network's window.
+    ///
+    /// * `n_frames`: number of frames since that run.
+    pub(crate) fn doubt(&self, n_frames: u64) -> f64 {
+        let speed = self.pace.map_or(f64::INFINITY, |pace| pace.velocity[0].hypot(pace.velocity[1]));
+        n_frames as f64 * (speed + LIMBS)
+    }
+
+    /// Moves the box with the person.
+    ///
+    /// * `n_frames`: number of frames for which the person moves on; `window_px`: height of the network's window, in pixels.
+    pub(crate) fn moved_on(self, n_frames: u64, window_px: f64) -> Self {
+        let velocity = self.pace.map_or([0.0; 2], |pace| pace.velocity);
+        let by = velocity.map(|by| by * n_frames as f64 * window_px);
+        Self {
+            outline: core::array::from_fn(|side| self.outline[side] + by[side % 2]),
+            ..self
+        }
+    }
+
     /// Returns true if the person has hardly moved since the last run of the network.
     ///
     /// * `n_frames`: number of frames since that run.
@@ -178,6 +201,20 @@ mod tests {
             ..with(0.0)
         };
         assert!(!doubtful.is_still(1));
+    }
+
+    #[test]
+    fn the_network_runs_first_on_the_person_who_may_have_moved_farthest() {
+        let track = Track::next(((BOX, Turn::Up), None), (BOX, -20.0), 6.0);
+        let with = |speed: f64| Track {
+            pace: Some(Pace::next(None, [speed, 0.0], 1)),
+            ..track
+        };
+        assert!(track.doubt(1) > with(0.5).doubt(9), "nothing is known of somebody new");
+        assert!(with(0.1).doubt(1) > with(0.01).doubt(1));
+        assert!(with(0.0).doubt(7) > with(0.1).doubt(1), "nobody is forgotten");
+        let moved = with(0.1).moved_on(2, 200.0);
+        assert_eq!(moved.outline, [140.0, 50.0, 220.0, 250.0]);
     }
 
     #[test]

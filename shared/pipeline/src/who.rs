@@ -10,6 +10,8 @@ use crate::sighting::{Sighting, Sightings};
 
 /// Size of the network's window around a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
+/// Speed of a person whom the network has not just seen, in heights of the person per second.
+const SPEED: f64 = 0.6;
 /// Number of ids reserved for each start of the process: a restarted process without memory starts after the reserved ids, so that no id is
 /// used twice.
 const IDS_OF_A_PROCESS: u64 = 1000;
@@ -183,11 +185,12 @@ fn longer_px(sighting: &Sighting) -> f64 {
 fn view(seen: Option<&Sightings>) -> View {
     let detection = |sighting: &Sighting| {
         let window_px = WINDOW * longer_px(sighting);
+        let moved_px = SPEED * longer_px(sighting) * f64::from(sighting.age_s);
         let joint = |joint: usize| {
             let heat = f64::from(sighting.heats[joint]);
             Some(Keypoint {
                 at_px: sighting.joint(joint)?,
-                sd_px: (expected_error(heat) * window_px).max(1.0),
+                sd_px: (expected_error(heat) * window_px).max(1.0).hypot(moved_px),
                 heat,
             })
         };

@@ -45,6 +45,8 @@ pub struct Workspace {
     turned: Vec<f32>,
     /// Bars that are painted over.
     covers: Vec<Bar>,
+    /// Number of runs of the network so far.
+    n_runs: u64,
 }
 
 impl Workspace {
@@ -52,6 +54,11 @@ impl Workspace {
     pub fn cover(&mut self, bars: &[Bar]) {
         self.covers.clear();
         self.covers.extend_from_slice(bars);
+    }
+
+    /// Returns the number of runs of the network so far.
+    pub fn n_runs(&self) -> u64 {
+        self.n_runs
     }
 }
 
@@ -264,6 +271,7 @@ impl PoseNetwork {
             Layout::Planes => [1, 3, height, width],
             Layout::Pixels => [1, height, width, 3],
         };
+        workspace.n_runs += 1;
         let Workspace {
             values,
             whole,

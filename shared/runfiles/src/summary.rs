@@ -80,6 +80,10 @@ pub struct Summary {
     /// Number of frames of every view that were searched in full, and number searched only near the last pose, by
     /// name, since the last start of the process.
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
+    /// Number of people that the views saw, added up over views and frames, since the last start of the process.
+    pub sightings: u64,
+    /// Number of these sightings that were predicted, because the network did not have the time to run on everybody.
+    pub sightings_predicted: u64,
     /// How far the results can be trusted, since the last start of the process.
     pub trust: Trust,
     /// Number of results from which each view is missing, by name and reason.

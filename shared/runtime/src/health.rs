@@ -7,10 +7,9 @@ use std::thread::{self, JoinHandle};
 
 use crate::metrics::{Meter, Passage, Rates};
 use messages::{CameraCounts, Cause, Health as HealthMessage, Metrics, Refusal, Span, topic};
-use rustix::time::{ClockId, clock_gettime};
 
 use crate::{Bus, Launch, PortError, Progress, Publisher, memory};
-use failure::now_nanos;
+use failure::{now_nanos, processor_nanos};
 
 /// Interval between heartbeats.
 pub const HEARTBEAT: Duration = Duration::from_millis(150);
@@ -342,8 +341,6 @@ fn spin() -> ! {
 
 /// Returns the processor time that this process has used, in milliseconds, modulo 2^32.
 fn cpu_millis() -> u32 {
-    let used = clock_gettime(ClockId::ProcessCPUTime);
-    let millis = used.tv_sec * 1000 + used.tv_nsec / 1_000_000;
     // The high bits do not matter, because only differences are used.
-    (millis & i64::from(u32::MAX)) as u32
+    (processor_nanos() / 1_000_000) as u32
 }

@@ -12,6 +12,8 @@ use crate::{
 
 /// Maximum distance of a position from the first pixel, in pixels.
 const MOST_PX: f64 = 1e6;
+/// Maximum time since the network last ran on a person, in seconds.
+const MOST_AGE_S: f32 = 60.0;
 /// Maximum number of columns or rows of a map.
 const MOST_CELLS: u32 = 1 << 16;
 
@@ -44,6 +46,7 @@ pub fn sightings_to_message(
     for (nth, person) in people.iter().enumerate() {
         message.candidates[nth].score = person.score;
         message.colours[nth] = person.colour.unwrap_or(NO_COLOUR);
+        message.ages_s[nth] = person.age_s;
         message.heats[nth][..person.heats.len()].copy_from_slice(&person.heats);
         for (slot, at) in message.joints[nth].iter_mut().zip(&person.joints) {
             *slot = at.unwrap_or_default();
@@ -87,6 +90,7 @@ pub fn sightings_from_message(
             front,
             extras: extras.next().unwrap_or_default().to_vec(),
             colour: colour_from_message(message, nth)?,
+            age_s: age_from_message(message, nth)?,
         };
         for joint in 0..person.joints.len() {
             let heat = message.heats[nth][joint];
@@ -117,6 +121,15 @@ fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]
         Some(value) => Err(refused("colours", nth, f64::from(value), "0 to 1")),
         None => Ok(Some(colour)),
     }
+}
+
+/// Reads the time since the network last ran on a person.
+fn age_from_message(message: &ViewPose, nth: usize) -> Result<f32, WireError> {
+    let age_s = message.ages_s[nth];
+    if (0.0..=MOST_AGE_S).contains(&age_s) {
+        return Ok(age_s);
+    }
+    Err(refused("ages_s", nth, f64::from(age_s), "0 to 60 s"))
 }
 
 /// Writes the grids of the maps of the people in a view. The caller fills in stamp and timing, and sends the map values one person after

@@ -52,6 +52,7 @@ pub(crate) fn of_view(
         find_every: find_every.alone,
         find_every_of_several: find_every.several,
         find_phase: view as u64 * find_every.alone / deployment.cameras.len().max(1) as u64,
+        frame_s: resolved.frame_rate_hz().map_or(0.0, f64::recip),
         least_heat: config.least_heat,
         ..NetworkSettings::default()
     };

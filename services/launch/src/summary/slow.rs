@@ -27,6 +27,18 @@ pub(super) fn text(
     })
 }
 
+/// Returns a line with the share of people whom the network did not have the time to look at; `None` if there are none.
+pub(super) fn predicted(summary: &Summary) -> Option<String> {
+    let share = summary.sightings_predicted as f64 / summary.sightings.max(1) as f64;
+    (share > 0.0).then(|| {
+        format!(
+            "  predicted     {:.0} % of the people in the views; the network had time for the others (network.looks). Fewer cameras, fewer other \
+             programs or more cores would help\n",
+            100.0 * share
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,6 +48,18 @@ mod tests {
             frames,
             ..Summary::default()
         }
+    }
+
+    #[test]
+    fn the_share_of_people_who_were_predicted_is_told() {
+        let summary = |sightings_predicted| Summary {
+            sightings: 400,
+            sightings_predicted,
+            ..Summary::default()
+        };
+        assert_eq!(predicted(&summary(0)), None);
+        assert!(predicted(&summary(100)).unwrap().contains("25 % of the people"));
+        assert_eq!(predicted(&Summary::default()), None);
     }
 
     #[test]

@@ -113,6 +113,11 @@ const ROWS: &[Row] = &[
         &["0.0", "0.5"],
     ),
     (
+        "network.looks",
+        &[("0", "is 0, expected 0.1 to 1000"), ("-1", "is -1")],
+        &["0.5", "2"],
+    ),
+    (
         "network.people",
         &[("0", "is 0, expected 1 to 8"), ("9", "is 9")],
         &["1"],

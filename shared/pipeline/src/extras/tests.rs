@@ -87,6 +87,7 @@ impl Scene {
             front: [0.0; 2],
             extras: EXTRAS.map(extra).to_vec(),
             colour: None,
+            age_s: 0.0,
         }
     }
 

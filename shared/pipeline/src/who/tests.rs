@@ -38,6 +38,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], heat: f32) -> Sighting {
         front: [0.0; 2],
         extras: Vec::new(),
         colour: None,
+        age_s: 0.0,
     }
 }
 

@@ -13,8 +13,9 @@ fn person() -> impl Strategy<Value = Sighting> {
         [-1.0..1.0_f32, -1.0..1.0_f32],
         prop::collection::vec(extra, 3),
         prop::option::of([0.0..=1.0_f32, 0.0..=1.0_f32, 0.0..=1.0_f32]),
+        0.0..=2.0_f32,
     )
-        .prop_map(|(joints, score, front, extras, colour)| {
+        .prop_map(|(joints, score, front, extras, colour, age_s)| {
             let is_seen = |joint: usize| joints[joint].3 && joints[joint].2 > 0.0;
             let at = |joint: usize| [joints[joint].0, joints[joint].1];
             let extra = |point: Option<(u16, u16, u16)>| {
@@ -31,6 +32,7 @@ fn person() -> impl Strategy<Value = Sighting> {
                 front,
                 extras: extras.into_iter().map(extra).collect(),
                 colour,
+                age_s,
             }
         })
 }
@@ -107,6 +109,7 @@ fn numbers_that_no_view_sends_are_refused() {
         front: [0.0; 2],
         extras: Vec::new(),
         colour: Some([0.5; 3]),
+        age_s: 0.1,
     };
     let sent = sightings_to_message(&[person], 0, [64, 48]).unwrap();
     sightings_from_message(&sent, 0).unwrap();
@@ -118,6 +121,11 @@ fn numbers_that_no_view_sends_are_refused() {
     for wrong in [f32::NAN, -0.5, 1.1] {
         let mut message = sent;
         message.colours[0][1] = wrong;
+        sightings_from_message(&message, 0).unwrap_err();
+    }
+    for wrong in [f32::NAN, -0.1, 61.0] {
+        let mut message = sent;
+        message.ages_s[0] = wrong;
         sightings_from_message(&message, 0).unwrap_err();
     }
     for wrong in [f32::NAN, f32::INFINITY, 2e6] {

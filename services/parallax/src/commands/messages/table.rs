@@ -160,9 +160,9 @@ structs! {
         connection name reserved;
     PoseMessage, "PoseMessage.v1": score level n_parts x y mixture;
     LocalMessage, "LocalMessage.v1": response contrast margin;
-    ViewPose, "ViewPose.v9":
+    ViewPose, "ViewPose.v10":
         stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates joints
-        local front heats colours keypoints;
+        local front heats colours ages_s keypoints;
     GridMessage, "GridMessage.v1": first_px cell_px size;
     EvidenceHeader, "EvidenceHeader.v4":
         stamp timing width height status n_levels n_people padding people x y scope_levels levels best size reserved;

@@ -1,0 +1,98 @@
+//! How often the network may run in a view, so that the view keeps up with the frame rate.
+
+/// Share of the processor time of all cores that the networks of all views may take. The rest is for decoding pictures, for the people in
+/// 3D, and for pages.
+const SHARE: f64 = 0.6;
+/// Weight of a new measurement in the mean times.
+const NEW_COST: f64 = 0.05;
+const NEW_LOAD: f64 = 0.2;
+/// A view is too slow if its frames take more than this share of the time between frames.
+const MOST_LOAD: f64 = 0.9;
+/// Factor for the budget per frame while the view is too slow, and growth per frame otherwise.
+const LESS: f64 = 0.95;
+const MORE: f64 = 1.01;
+/// Minimum share of the budget that is kept.
+const LEAST_KEPT: f64 = 0.1;
+
+/// Number of runs of the network that a view can afford per frame at the frame rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LookBudget {
+    /// Time between frames, in seconds.
+    interval_s: f64,
+    /// Processor time per frame, in seconds, if the view keeps up.
+    most_s: f64,
+    /// Fraction of `most_s` that is used. It decreases while the view is too slow, because other programs may need the cores.
+    kept: f64,
+    /// Mean processor time of one run, in seconds; `None` before the first run.
+    cost_s: Option<f64>,
+    /// Mean duration of a frame, as a fraction of the interval.
+    load: f64,
+}
+
+impl LookBudget {
+    /// Creates the budget of a view.
+    ///
+    /// * `cores_per_view`: number of cores divided by the number of views that they process.
+    /// * `interval_s`: time between frames, in seconds.
+    pub fn new(cores_per_view: f64, interval_s: f64) -> Self {
+        Self {
+            interval_s,
+            most_s: SHARE * cores_per_view * interval_s,
+            kept: 1.0,
+            cost_s: None,
+            load: 0.0,
+        }
+    }
+
+    /// Returns the number of runs that a frame can afford on average; `None` before the time of a run is known.
+    pub fn looks(&self) -> Option<f64> {
+        Some(self.kept * self.most_s / self.cost_s?)
+    }
+
+    /// Takes note of the times that a frame took.
+    ///
+    /// * `n_looks`: number of runs.
+    /// * `times_s`: processor time, and time on the clock, in seconds.
+    pub fn spent(&mut self, n_looks: f64, [processor_s, clock_s]: [f64; 2]) {
+        self.load += NEW_LOAD * (clock_s / self.interval_s - self.load);
+        self.kept = if self.load > MOST_LOAD {
+            (self.kept * LESS).max(LEAST_KEPT)
+        } else {
+            (self.kept * MORE).min(1.0)
+        };
+        if n_looks > 0.0 && processor_s > 0.0 {
+            let new = processor_s / n_looks;
+            self.cost_s = Some(self.cost_s.map_or(new, |cost| cost + NEW_COST * (new - cost)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_is_what_the_cores_manage_between_two_frames() {
+        let mut budget = LookBudget::new(0.5, 1.0 / 15.0);
+        assert_eq!(budget.looks(), None, "nothing is known yet");
+        budget.spent(4.0, [0.04, 0.05]);
+        // 20 ms of 67 ms on half a core, at 10 ms a run.
+        assert!((budget.looks().unwrap() - 2.0).abs() < 1e-9);
+        budget.spent(0.0, [0.001, 0.001]);
+        assert!((budget.looks().unwrap() - 2.0).abs() < 1e-9, "no run, no news");
+    }
+
+    #[test]
+    fn a_view_that_does_not_keep_up_runs_the_network_less_often_until_it_does() {
+        let mut budget = LookBudget::new(1.0, 0.05);
+        let looks_after = |budget: &mut LookBudget, n: u32, clock_s: f64| {
+            (0..n).for_each(|_| budget.spent(1.0, [0.01, clock_s]));
+            budget.looks().unwrap()
+        };
+        let at_first = looks_after(&mut budget, 1, 0.02);
+        assert_eq!(looks_after(&mut budget, 1, 0.2), at_first, "one slow frame");
+        let slow = looks_after(&mut budget, 20, 0.08);
+        assert!(slow < 0.5 * at_first && slow > 0.0, "{slow}");
+        assert_eq!(looks_after(&mut budget, 200, 0.02), at_first);
+    }
+}
