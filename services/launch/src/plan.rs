@@ -57,7 +57,7 @@ pub fn resolve_on(deployment: &Deployment, host: Option<&Host>) -> Result<Resolv
     let footage = crate::cameras::footage(deployment, &is_here);
     let found = keypoints::found(deployment)?;
     let mut resolved = Resolved {
-        footage: footage.map_err(|error| inputs::of_deployment(error, deployment))?,
+        footage: footage?,
         deployment: deployment.clone(),
         search_size: None,
         extra_keypoints: found.extra,

@@ -56,11 +56,6 @@ impl Prepared {
     ///
     /// Fails if an input cannot be read, does not match the other inputs, or contradicts the deployment.
     pub fn new(resolved: &Resolved) -> Result<Self, Failure> {
-        let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
-        Self::read(resolved).map_err(with_origin)
-    }
-
-    fn read(resolved: &Resolved) -> Result<Self, Failure> {
         let deployment = &resolved.deployment;
         let model = inputs::model_or_shipped(deployment.paper.model.as_deref())?;
         let rig = inputs::rig_of(deployment)?;
@@ -122,11 +117,6 @@ impl Prepared {
     ///
     /// Fails if a network or the table cannot be read, or does not match the model.
     pub fn check_predictions(&self, resolved: &Resolved) -> Result<(), Failure> {
-        let with_origin = |failure| inputs::of_deployment(failure, &resolved.deployment);
-        self.check_quality(resolved).map_err(with_origin)
-    }
-
-    fn check_quality(&self, resolved: &Resolved) -> Result<(), Failure> {
         let deployment = &resolved.deployment;
         inputs::check_maps(deployment)?;
         let paper = &deployment.paper;

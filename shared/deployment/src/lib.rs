@@ -90,8 +90,6 @@ pub struct Deployment {
     pub device: Device,
     /// Folder for the results.
     pub output: PathBuf,
-    /// Origin of the footage, as a hint to show if a file is missing.
-    pub data: Option<String>,
     /// The cameras, one `[[camera]]` each, in the order of the views.
     #[serde(rename = "camera")]
     pub cameras: Vec<capture::Camera>,

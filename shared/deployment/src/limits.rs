@@ -20,6 +20,7 @@ pub(super) fn check(it: &Deployment) -> Result<(), Complaint> {
     }
     capture(&it.capture)?;
     between("network.least_heat", it.network.least_heat)?;
+    between("network.looks", it.network.looks.unwrap_or(1.0))?;
     supervise(it)
 }
 

@@ -331,13 +331,3 @@ pub fn tau(file: &Path, n_parts: usize) -> Result<Vec<f32>, Failure> {
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|error| advice::on_folder(folder, &error))
 }
-
-/// Adds the origin of the data to a failure to read an input, if the deployment file states this origin.
-pub fn of_deployment(failure: Failure, deployment: &Deployment) -> Failure {
-    match &deployment.data {
-        Some(data) if failure.kind() == ExitKind::Input => {
-            failure.with_another_hint(format!("the origin of the deployment's data is: {data}"))
-        }
-        _ => failure,
-    }
-}

@@ -2,7 +2,6 @@
 
 /// Keys without a numeric value.
 pub(super) const OTHERS: &[&str] = &[
-    "data",
     "name",
     "rig",
     "unit",
