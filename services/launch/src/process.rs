@@ -1,19 +1,20 @@
 //! Runs one process of a deployment: creates the settings of its service from the resolved deployment.
 
+mod cores;
 mod live;
 pub(crate) mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use deployment::{Stage, Topology};
+use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};
 use footage::SourceSpec;
 use geometry::Framing;
 use messages::topic;
-use pipeline::{ExtrasStep, FuseStep, LookBudget, SkeletonStep, SpaceStep};
+use pipeline::{ExtrasStep, FuseStep, SkeletonStep, SpaceStep};
 use rayon::ThreadPoolBuilder;
-use runtime::{Delivery, Service};
+use runtime::Service;
 use viewquality::Forecaster;
 
 use crate::find_every::FOLLOWED_S;
@@ -169,7 +170,7 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
         view,
         source: SourceSpec {
             most_shrink: most_shrink(&framing),
-            threads: cores_each(&topology, Stage::Capture).map(|cores| cores.max(1.0) as usize),
+            threads: cores::each(&topology, Stage::Capture).map(|cores| cores.max(1.0) as usize),
             ..crate::cameras::source(&deployment.cameras[view], &deployment.capture)
         },
         timeline: resolved.footage[view].timeline,
@@ -210,32 +211,10 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         frame_step: resolved.deployment.capture.frame_step,
         frame_rate_hz: resolved.frame_rate_hz(),
         most_apart: most_apart(resolved),
-        looks: looks(resolved, &topology),
+        looks: cores::looks(resolved, &topology),
         patience: resolved.patience(),
     };
     pose::run(service, &job)
-}
-
-/// Returns the number of cores for each process of a stage on this machine; `None` if the number of cores is unknown.
-fn cores_each(topology: &Topology, stage: Stage) -> Option<f64> {
-    let cores = std::thread::available_parallelism().ok()?;
-    let processes = topology.processes().iter();
-    let n = processes.filter(|process| process.service == stage.name()).count();
-    Some(cores.get() as f64 / n.max(1) as f64)
-}
-
-/// Returns the limit for the runs of the network in a view. With `realtime` delivery, it is what the cores manage at the frame rate.
-fn looks(resolved: &Resolved, topology: &Topology) -> pose::Looks {
-    let deployment = &resolved.deployment;
-    if let Some(looks) = deployment.network.looks {
-        return pose::Looks::Fixed(looks);
-    }
-    let rate_hz = resolved.frame_rate_hz().filter(|_| resolved.delivery() == Delivery::Realtime);
-    let (Some(rate_hz), Some(per_view)) = (rate_hz, cores_each(topology, Stage::Pose)) else {
-        return pose::Looks::All;
-    };
-    let interval_s = deployment.capture.frame_step.max(1) as f64 / rate_hz;
-    pose::Looks::Affordable(LookBudget::new(per_view, interval_s))
 }
 
 /// Returns the largest number of frames between two frames in which the same person can be followed. With any `frame_step`, it is large
@@ -447,7 +426,7 @@ fn replay(
 mod tests {
     use std::path::Path;
 
-    use deployment::{AnyMachine, Loaded, RecordingPlan};
+    use deployment::{AnyMachine, Loaded, RecordingPlan, Topology};
     use geometry::OutSize;
 
     use super::*;

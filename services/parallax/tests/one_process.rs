@@ -84,7 +84,10 @@ fn many_processes_give_the_bits_of_one_where_people_are_predicted() {
     case.set_network("file = \"net.onnx\"\ndetector = \"det.onnx\"\nlooks = 0.6");
     let file = case.path("deployment.toml");
     let text = std::fs::read_to_string(&file).unwrap();
-    case.write("deployment.toml", format!("{text}\n[capture]\nframe_rate_hz = 30.0\n"));
+    case.write(
+        "deployment.toml",
+        format!("{text}\n[capture]\nframe_rate_hz = 30.0\n"),
+    );
     run_as_they_are(&case);
     let summary = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();

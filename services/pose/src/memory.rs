@@ -22,7 +22,7 @@ const LONG_NANOS: u64 = 60_000_000_000;
 #[derive(Debug, Default)]
 pub(crate) struct NetworkState {
     pub(crate) memory: NetworkMemory,
-    /// What the cores manage, if runs of the network are limited by it.
+    /// Budget for the runs of the network, if the cores limit them.
     pub(crate) budget: Option<LookBudget>,
     /// Time of the last person or the last warning, and number of frames since.
     pub(crate) nobody: Option<(u64, u64)>,
@@ -46,9 +46,7 @@ impl NetworkState {
         self.memory.begin(frame, job.most_apart);
         self.memory.allow(match job.looks {
             Looks::Fixed(looks) => Some(looks),
-            Looks::All | Looks::Affordable(_) => {
-                self.budget.as_ref().and_then(LookBudget::looks)
-            }
+            Looks::All | Looks::Affordable(_) => self.budget.as_ref().and_then(LookBudget::looks),
         });
     }
 

@@ -24,9 +24,9 @@ const MAX_SCALE: f64 = 64.0;
 /// Maximum translation, in pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
-/// Maximum distance between samples, in source pixels. The two focal lengths of a lens differ by less than the excess, so that a picture that
-/// is only rotated takes one sample per pixel.
-const MOST_APART: f64 = 1.05;
+/// Maximum distance between neighbouring output pixels with a single sample, in source pixels. The two focal lengths of a lens differ by
+/// less than the excess, so that a picture that is only rotated takes one sample per pixel.
+const SINGLE: f64 = 1.05;
 
 /// The value of pixels outside of the source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,9 +72,9 @@ pub enum WarpError {
 /// * With a map that keeps rows and columns and does not enlarge (shrink, crop, mirror), the value is the area mean of the rectangle that
 ///   the output pixel covers. It is exact up to rounding to a grey level (half up).
 /// * With any other map, the value is the mean of `n × m` bilinear samples. They are spread evenly over the output pixel and are at most
-///   1.05 source pixels apart. For a rotated image, the result is the same as rotating it at full size (bilinear) and then averaging areas.
-///   Positions are rounded to 1/32 source pixel. From 4 source pixels per output pixel on, the rounding is coarser, but never coarser than
-///   1/64 output pixel.
+///   one source pixel apart, or 1.05 if there is only one. For a rotated image, the result is the same as rotating it at full size
+///   (bilinear) and then averaging areas. Positions are rounded to 1/32 source pixel. From 4 source pixels per output pixel on, the
+///   rounding is coarser, but never coarser than 1/64 output pixel.
 ///
 /// The result is bit-identical on every machine, because it only sums integers, or `f32` values in a fixed order.
 #[derive(Debug, Clone)]
@@ -124,7 +124,7 @@ impl Warp {
         } else if keeps_rows && a.abs() >= 1.0 && d.abs() >= 1.0 {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
-            let n_samples = scales.map(|scale| (scale - MOST_APART + 1.0).ceil().max(1.0) as usize);
+            let n_samples = scales.map(n_samples);
             let sizes = [source, output];
             let sampled = Sampled::new(sizes, source_from_output, n_samples, fill);
             Near::new(&sampled).map_or(Plan::Sampled(sampled), Plan::Near)
@@ -200,6 +200,16 @@ pub fn resize_map(source: Size, output: Size) -> Affine {
     let sx = source.width as f64 / output.width as f64;
     let sy = source.height as f64 / output.height as f64;
     [[sx, 0.0, (sx - 1.0) / 2.0], [0.0, sy, (sy - 1.0) / 2.0]]
+}
+
+/// Returns the number of samples of an output pixel along rows or columns.
+///
+/// * `scale`: number of source pixels per output pixel.
+fn n_samples(scale: f64) -> usize {
+    if scale <= SINGLE {
+        return 1;
+    }
+    (scale - 1e-9).ceil() as usize
 }
 
 /// Returns the number of source pixels per output pixel along the output's rows and columns.

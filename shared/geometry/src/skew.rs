@@ -19,7 +19,7 @@ const MOST_SPEED: f64 = 9.0;
 /// belongs to a different point.
 const MOST_CHANGE: f64 = 6.0;
 /// Maximum time between two pictures that determine a velocity, in seconds.
-const LONGEST_GAP_S: f64 = 0.3;
+const LONGEST_GAP_S: f64 = 0.15;
 /// Assumed speed of a point with unknown velocity, in heights per second.
 const UNKNOWN_SPEED: f64 = 1.0;
 

@@ -1,4 +1,4 @@
-//! How often the network may run in a view, so that the view keeps up with the frame rate.
+//! Limits how often the network runs in a view, so that the view keeps up with the frame rate.
 
 /// Share of the processor time of all cores that the networks of all views may take. The rest is for decoding pictures, for the people in
 /// 3D, and for pages.
@@ -79,7 +79,10 @@ mod tests {
         // 20 ms of 67 ms on half a core, at 10 ms a run.
         assert!((budget.looks().unwrap() - 2.0).abs() < 1e-9);
         budget.spent(0.0, [0.001, 0.001]);
-        assert!((budget.looks().unwrap() - 2.0).abs() < 1e-9, "no run, no news");
+        assert!(
+            (budget.looks().unwrap() - 2.0).abs() < 1e-9,
+            "no run, no news"
+        );
     }
 
     #[test]

@@ -114,13 +114,15 @@ impl Looks<'_> {
             return;
         };
         let credit = credit - if memory.has_searched { SEARCH } else { 0.0 };
-        let mut unseen: Vec<usize> = (0..tracks.len()).filter(|nth| !tracks[*nth].is_seen).collect();
+        let mut unseen: Vec<usize> =
+            (0..tracks.len()).filter(|nth| !tracks[*nth].is_seen).collect();
         let doubt = |nth: &usize| tracks[*nth].doubt(tracks[*nth].n_held + hold.gap);
         unseen.sort_by(|a, b| doubt(b).total_cmp(&doubt(a)));
         for nth in unseen.into_iter().skip(credit.max(0.0) as usize) {
             let track = &mut tracks[nth];
             let n_frames = track.n_held + hold.gap;
-            let Some(before) = before.get_mut(track.index).filter(|_| n_frames <= hold.most_to_save)
+            let Some(before) =
+                before.get_mut(track.index).filter(|_| n_frames <= hold.most_to_save)
             else {
                 continue;
             };

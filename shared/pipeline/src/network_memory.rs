@@ -405,7 +405,11 @@ mod tests {
         };
         assert_eq!(left(Some(1.5), 0), Some(1.5));
         assert_eq!(left(Some(1.5), 1), Some(3.0));
-        assert_eq!(left(Some(1.5), 0), Some(3.0), "no more than two frames' runs");
+        assert_eq!(
+            left(Some(1.5), 0),
+            Some(3.0),
+            "no more than two frames' runs"
+        );
         assert_eq!(left(Some(1.5), 20), Some(3.0));
         assert_eq!(left(Some(1.5), 0), Some(-2.5), "a limited debt");
         assert_eq!(left(None, 3), None);

@@ -121,7 +121,9 @@ impl Track {
     ///
     /// * `n_frames`: number of frames since that run.
     pub(crate) fn doubt(&self, n_frames: u64) -> f64 {
-        let speed = self.pace.map_or(f64::INFINITY, |pace| pace.velocity[0].hypot(pace.velocity[1]));
+        let speed = self.pace.map_or(f64::INFINITY, |pace| {
+            pace.velocity[0].hypot(pace.velocity[1])
+        });
         n_frames as f64 * (speed + LIMBS)
     }
 
@@ -210,9 +212,15 @@ mod tests {
             pace: Some(Pace::next(None, [speed, 0.0], 1)),
             ..track
         };
-        assert!(track.doubt(1) > with(0.5).doubt(9), "nothing is known of somebody new");
+        assert!(
+            track.doubt(1) > with(0.5).doubt(9),
+            "nothing is known of somebody new"
+        );
         assert!(with(0.1).doubt(1) > with(0.01).doubt(1));
-        assert!(with(0.0).doubt(7) > with(0.1).doubt(1), "nobody is forgotten");
+        assert!(
+            with(0.0).doubt(7) > with(0.1).doubt(1),
+            "nobody is forgotten"
+        );
         let moved = with(0.1).moved_on(2, 200.0);
         assert_eq!(moved.outline, [140.0, 50.0, 220.0, 250.0]);
     }
