@@ -41,7 +41,7 @@ pub(super) fn on_footage(error: &FeedError, camera: &str) -> String {
         _ => format!(
             "the `source` of {camera} can be a video, an image, a folder of images, a glob or a scene (synth://...). With `keypoints`, \
              it may be left out. \
-             Relative paths are relative to the deployment file"
+             Relative paths are relative to the deployment file; comments in this file may state the origin of its data"
         ),
     }
 }
