@@ -271,7 +271,8 @@ mod long {
     fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("filled", &[300; 3], &more);
-        // The processes are children of the run. One of these processes is killed when there is no space to start another.
+        // The processes are children of the run. One of these processes is killed when there is no space to start another. The space that it
+        // frees is filled at once.
         let script = "mount -t tmpfs -o size=64m tmpfs /dev/shm\n\
             \"$PARALLAX\" run deployment.toml --force --json & run=$!\n\
             while [ \"$(cat out/pose3d.jsonl.part 2>/dev/null | wc -l)\" -lt 10 ]; do\n\
@@ -279,12 +280,15 @@ mod long {
             done\n\
             cat /dev/zero >/dev/shm/filler 2>/dev/null || true\n\
             stat -f -c %a /dev/shm >free\n\
+            while kill -0 $run 2>/dev/null; do\n\
+              cat /dev/zero >>/dev/shm/filler 2>/dev/null || true; sleep 0.01\n\
+            done & filling=$!\n\
             for dir in /proc/[0-9]*; do\n\
               line=$(tr '\\0' ' ' <$dir/cmdline 2>/dev/null || true)\n\
               case \"$line\" in *\"$PWD\"*\" --index 1\"*) case \"$line\" in\n\
                 *\" service pose \"*) kill -9 ${dir#/proc/};; esac;; esac\n\
             done\n\
-            code=0; wait $run || code=$?; exit $code";
+            code=0; wait $run || code=$?; kill $filling 2>/dev/null || true; exit $code";
         let Some(started) = Started::in_mount_namespace(case.folder(), script) else {
             eprintln!("skipped: no private file system may be mounted here");
             return;
