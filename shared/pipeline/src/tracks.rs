@@ -214,7 +214,7 @@ mod tests {
         };
         assert!(
             track.doubt(1) > with(0.5).doubt(9),
-            "nothing is known of somebody new"
+            "a new person comes first"
         );
         assert!(with(0.1).doubt(1) > with(0.01).doubt(1));
         assert!(
