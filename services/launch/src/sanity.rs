@@ -378,7 +378,7 @@ pub(crate) fn warn(resolved: &Resolved, lengths: &[Option<u64>]) -> Result<(), F
 }
 
 /// Returns the number of cores that this process may use, if it is known.
-fn n_cores() -> Option<usize> {
+pub(crate) fn n_cores() -> Option<usize> {
     let known = std::thread::available_parallelism();
     known.ok().map(usize::from)
 }

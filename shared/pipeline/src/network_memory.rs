@@ -29,6 +29,8 @@ pub(crate) const SEARCH: f64 = 1.0;
 const MOST_DEBT: f64 = 4.0;
 /// Time for which a person is not looked at to save runs, at most, as a fraction of the maximum gap between frames (0.2 s).
 const UNSEEN: f64 = 0.5;
+/// Time for which a search waits for runs at most, as a multiple of the same time (1 s).
+const LONGEST_WAIT: u64 = 5;
 
 /// State of the step from frame to frame: reusable memory, and the boxes of the people seen.
 #[derive(Debug, Default)]
@@ -65,6 +67,8 @@ pub struct NetworkMemory {
     pub(crate) has_searched: bool,
     /// Number of runs of the network that are left; negative if too many were used. `None` if there is no limit.
     pub(crate) credit: Option<f64>,
+    /// Number of frames for which a search has waited until there are runs left.
+    n_waited: u64,
     /// Number of runs of the network in the last frame; a search counts as [`SEARCH`] runs.
     pub(crate) n_looks: f64,
 }
@@ -207,9 +211,11 @@ impl NetworkMemory {
     /// Limits the number of runs of the network. Runs that a frame does not use are left for the next frame; runs beyond the limit are
     /// taken from later frames.
     ///
+    /// There is no limit in the first frame, or if the frame rate is unknown: nobody can then be predicted.
+    ///
     /// * `looks`: number of runs per frame, on average; `None` for no limit.
     pub fn allow(&mut self, looks: Option<f64>) {
-        self.credit = looks.map(|looks| {
+        self.credit = looks.filter(|_| self.hold.is_some()).map(|looks| {
             let left = self.credit.unwrap_or(0.0).clamp(-MOST_DEBT, looks.max(1.0));
             left + looks
         });
@@ -226,10 +232,16 @@ impl NetworkMemory {
         self.credit = self.credit.map(|credit| credit - self.n_looks);
     }
 
-    /// Returns true if this frame must be searched for boxes, even if people are seen. A search waits until there are runs left.
-    pub(crate) fn is_due(&self) -> bool {
+    /// Returns true if this frame must be searched for boxes, even if people are seen. A search waits until there are runs left, but not
+    /// longer than [`LONGEST_WAIT`], so that new people are found however few runs there are.
+    pub(crate) fn is_due(&mut self) -> bool {
+        let is_due = self.until.is_none_or(|until| until == 0);
         let is_affordable = self.credit.is_none_or(|credit| credit > 0.0);
-        self.until.is_none_or(|until| until == 0 && is_affordable)
+        let is_late =
+            self.hold.is_some_and(|hold| self.n_waited >= LONGEST_WAIT * hold.most_to_save);
+        let has_to_wait = is_due && !is_affordable && !is_late;
+        self.n_waited = if has_to_wait { self.n_waited + 1 } else { 0 };
+        is_due && !has_to_wait
     }
 
     /// Returns true if this frame was searched for boxes.
@@ -397,6 +409,9 @@ mod tests {
     #[test]
     fn runs_that_are_left_are_kept_for_the_next_frame_and_no_longer() {
         let mut memory = NetworkMemory::default();
+        memory.allow(Some(1.5));
+        assert_eq!(memory.credit, None, "no rate is known");
+        (0..2).for_each(|frame| memory.begin(frame, Some(24.0)));
         let mut left = |looks: Option<f64>, n_runs: u64| {
             memory.allow(looks);
             let credit = memory.credit;
@@ -414,6 +429,21 @@ mod tests {
         assert_eq!(left(Some(1.5), 0), Some(-2.5), "a limited debt");
         assert_eq!(left(None, 3), None);
         assert_eq!(left(Some(1.5), 0), Some(1.5));
+    }
+
+    #[test]
+    fn a_search_waits_for_runs_but_not_for_ever() {
+        let mut memory = NetworkMemory {
+            until: Some(0),
+            ..NetworkMemory::default()
+        };
+        (0..2).for_each(|frame| memory.begin(frame, Some(24.0)));
+        memory.credit = Some(1.0);
+        assert!(memory.is_due());
+        memory.credit = Some(-4.0);
+        let n_waited = (0..1000).take_while(|_| !memory.is_due()).count();
+        assert_eq!(n_waited, 60, "one second at 60 Hz");
+        assert!(!memory.is_due(), "it waits again");
     }
 
     #[test]

@@ -5,13 +5,14 @@ use pipeline::LookBudget;
 use runtime::Delivery;
 
 use crate::resolved::Resolved;
+use crate::sanity::n_cores;
 
 /// Returns the number of cores for each process of a stage on this machine; `None` if the number of cores is unknown.
 pub(super) fn each(topology: &Topology, stage: Stage) -> Option<f64> {
-    let cores = std::thread::available_parallelism().ok()?;
+    let cores = n_cores()?;
     let processes = topology.processes().iter();
     let n = processes.filter(|process| process.service == stage.name()).count();
-    Some(cores.get() as f64 / n.max(1) as f64)
+    Some(cores as f64 / n.max(1) as f64)
 }
 
 /// Returns the limit for the runs of the network in a view. With `realtime` delivery, it is what the cores manage at the frame rate.
