@@ -5,6 +5,7 @@ use training::datasets::{ReadOptions, Sample, Selection, SkeletonTable, read};
 use crate::shared_dir;
 
 #[test]
+#[ignore = "needs ../shared"]
 fn all_people_of_parse_and_lspet_are_valid() {
     let Some(shared) = shared_dir() else { return };
     for (name, n_people) in [("parse", 200), ("lspet", 861)] {
@@ -15,6 +16,7 @@ fn all_people_of_parse_and_lspet_are_valid() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn a_few_joints_lie_outside_by_no_more_than_two_pixels() {
     let Some(shared) = shared_dir() else { return };
     let strict = ReadOptions {
@@ -30,6 +32,7 @@ fn a_few_joints_lie_outside_by_no_more_than_two_pixels() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn parts_of_a_parse_sample_move_with_rotation_and_mirroring() {
     let Some(shared) = shared_dir() else { return };
     let options = ReadOptions {

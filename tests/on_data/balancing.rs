@@ -92,6 +92,7 @@ pub(crate) struct Clip {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached() {
     let Some(dir) = shared_dir() else { return };
     let rig = rig();

@@ -195,6 +195,7 @@ fn reprojection(folder: &Path, rig: &Rig) -> f64 {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_qualisys_file_and_the_toml_made_from_it_agree_except_for_the_distortion() {
     let Some(folder) = balancing() else { return };
     let qualisys = files::read(&folder.join("calibration/Calib.qca.txt"), &z_up()).unwrap();
@@ -217,6 +218,7 @@ fn the_qualisys_file_and_the_toml_made_from_it_agree_except_for_the_distortion()
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_rigs_in_configs_agree_with_the_original_files() {
     let Some(folder) = balancing() else { return };
     let qualisys = files::read(&folder.join("calibration/Calib.qca.txt"), &z_up()).unwrap();
@@ -229,6 +231,7 @@ fn the_rigs_in_configs_agree_with_the_original_files() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_cameras_of_panoptic_are_on_a_dome_above_its_floor() {
     let Some(folder) = shared_dir().map(|shared_dir| shared_dir.join("data/panoptic")) else {
         return;
@@ -255,6 +258,7 @@ fn the_cameras_of_panoptic_are_on_a_dome_above_its_floor() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn every_rig_in_configs_is_plausible() {
     for name in [
         "pose2sim-balancing",
@@ -273,6 +277,7 @@ fn every_rig_in_configs_is_plausible() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_refined_rig_fits_the_detections_better_than_the_shipped_one() {
     let Some(folder) = balancing() else { return };
     let rigs = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"].map(our_rig);
@@ -294,6 +299,7 @@ fn the_refined_rig_fits_the_detections_better_than_the_shipped_one() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_reference_lies_on_the_detections() {
     let Some(folder) = balancing() else { return };
     let px = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"]
@@ -304,6 +310,7 @@ fn the_reference_lies_on_the_detections() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_inaccurate_camera_has_the_largest_epipolar_error() {
     let Some(folder) = balancing() else { return };
     let rig = our_rig("pose2sim-balancing-shipped.toml");
@@ -331,6 +338,7 @@ fn the_inaccurate_camera_has_the_largest_epipolar_error() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_rolls_are_those_of_the_reference_runs() {
     let rig = our_rig("pose2sim-balancing.toml");
     let rolls: Vec<f64> = rig
@@ -348,6 +356,7 @@ fn the_rolls_are_those_of_the_reference_runs() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn a_caliscope_rig_reproduces_the_spacing_of_its_board() {
     let Some(folder) = shared_dir().map(|dir| dir.join("data/caliscope/post_optimization")) else {
         return;

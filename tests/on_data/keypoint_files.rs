@@ -14,6 +14,7 @@ use std::time::Instant;
 use crate::shared_dir;
 
 #[test]
+#[ignore = "needs ../shared"]
 fn keypoints_of_the_balancing_person_become_maps_whose_maxima_lie_on_them() {
     let Some(shared) = shared_dir() else { return };
     let folder = shared.join("data/pose2sim_balancing/openpose");

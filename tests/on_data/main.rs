@@ -1,6 +1,6 @@
-//! Tests on real data. They only run if the data folder is beside the repository.
+//! Tests on real data. They are skipped if the data folder is not beside the repository.
 //!
-//! `cargo test --workspace --features system-tests/data --test on_data`
+//! `cargo test --workspace --test on_data -- --ignored --nocapture`
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![expect(

@@ -42,6 +42,7 @@ fn assert_same_points(dir: &Path, files: [&str; 6], step_mm: f64) {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_six_encodings_of_a_trial_give_the_same_points() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d");
@@ -61,6 +62,7 @@ fn the_six_encodings_of_a_trial_give_the_same_points() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d/others");
@@ -117,6 +119,7 @@ fn height_and_leg_noise(motion: &Motion) -> (f64, f64) {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn files_of_three_laboratories_are_converted_by_the_presets() {
     let Some(dir) = shared_dir() else { return };
     let data = dir.join("data");
@@ -160,6 +163,7 @@ fn files_of_three_laboratories_are_converted_by_the_presets() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn files_without_a_complete_person_are_refused() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d");

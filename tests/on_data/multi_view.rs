@@ -111,6 +111,7 @@ fn run_file(shared: &Path, name: &str) -> Value {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn epipolar_lines_agree_with_the_runs() {
     let Some(shared) = shared_dir() else { return };
     let he = run_file(&shared, "mv_C1_C2");
@@ -132,6 +133,7 @@ fn epipolar_lines_agree_with_the_runs() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_heat_map_of_a_line_agrees_with_the_program() {
     let Some(shared) = shared_dir() else { return };
     let ends = [[0.5, 100.25], [640.5, 333.75]];
@@ -288,6 +290,7 @@ fn compare(pair: &Pair, run: &Value, name: &str, ours: &PairEstimate) {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn released_runs_on_humaneva_are_reproduced() {
     let Some(shared) = shared_dir() else { return };
     let pair = Pair::humaneva(&shared);
@@ -327,6 +330,7 @@ fn released_runs_on_humaneva_are_reproduced() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn released_runs_on_umpm_are_reproduced() {
     let Some(shared) = shared_dir() else { return };
     let pair = Pair::umpm(&shared);
@@ -339,6 +343,7 @@ fn released_runs_on_umpm_are_reproduced() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_energy_of_the_paper_never_decreases_on_real_pairs() {
     let Some(shared) = shared_dir() else { return };
     for pair in [Pair::humaneva(&shared), Pair::umpm(&shared)] {

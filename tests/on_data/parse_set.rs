@@ -28,6 +28,7 @@ struct Outcome {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn pcp_on_images_101_to_200_agrees_with_the_original_program() {
     let Some(shared) = shared_dir() else { return };
     let model = Arc::new(fmp::files::read(&shared.join("data/models/parse_fmp.mat")).unwrap());

@@ -63,6 +63,7 @@ fn sample(films: &[Film], seed: u64) -> Vec<Film> {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_balancing_cameras_are_found_from_the_person_alone() {
     let Some(shared) = shared_dir() else { return };
     let rig = balancing::rig();

@@ -15,6 +15,7 @@ use crate::shared_dir;
 type Joints = [[f64; 2]; 14];
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_shipped_model_has_the_accuracy_of_its_card() {
     let Some(shared) = shared_dir() else { return };
     let file =
@@ -54,6 +55,7 @@ fn the_shipped_model_has_the_accuracy_of_its_card() {
 const CARD: [f64; 2] = [73.3, 67.4];
 
 #[test]
+#[ignore = "needs ../shared"]
 fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_better_one() {
     let Some(shared) = shared_dir() else { return };
     let models = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models");

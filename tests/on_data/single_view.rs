@@ -133,6 +133,7 @@ impl Stages {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_pyramid_equals_the_test_vectors_exactly() {
     let Some(shared) = shared_dir() else { return };
     let stages = Stages::new(&shared);
@@ -156,6 +157,7 @@ fn the_pyramid_equals_the_test_vectors_exactly() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn features_equal_the_test_vectors_up_to_rounding() {
     let Some(shared) = shared_dir() else { return };
     let stages = Stages::new(&shared);
@@ -174,6 +176,7 @@ fn features_equal_the_test_vectors_up_to_rounding() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn responses_messages_and_root_scores_equal_the_test_vectors() {
     let Some(shared) = shared_dir() else { return };
     let stages = Stages::new(&shared);
@@ -209,6 +212,7 @@ fn responses_messages_and_root_scores_equal_the_test_vectors() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn the_distance_transform_equals_its_test_vector() {
     let Some(shared) = shared_dir() else { return };
     let stages = Stages::new(&shared);
@@ -328,6 +332,7 @@ fn model(shared: &Path, name: &str) -> Arc<Model> {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn poses_on_humaneva_and_umpm_images_agree_with_the_authors_program() {
     let Some(shared) = shared_dir() else { return };
     let humaneva = model(&shared, "humaneva_fmp.txt");
@@ -356,6 +361,7 @@ fn poses_on_humaneva_and_umpm_images_agree_with_the_authors_program() {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn poses_on_grey_odd_sized_and_portrait_images_agree_with_the_authors_program() {
     let Some(shared) = shared_dir() else { return };
     let model = model(&shared, "parse_fmp.mat");

@@ -305,6 +305,7 @@ fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
     let Some(shared) = shared_dir() else { return };
     let motion = Motion::read(&shared.join("data/panoptic_motion"));

@@ -24,6 +24,7 @@ struct Searched {
 }
 
 #[test]
+#[ignore = "needs ../shared"]
 fn tracking_is_nearly_as_accurate_as_a_full_search() {
     let Some(dir) = shared_dir() else { return };
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

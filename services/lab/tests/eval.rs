@@ -287,12 +287,12 @@ fn an_unusable_consistency_file_is_refused() {
     );
 }
 
-/// Tests that take a long time; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use super::*;
 
     #[test]
+    #[ignore = "takes long"]
     fn consistency_between_views_is_learned_and_used() {
         let case = two_people();
         let out = ["--out", "a.consistency", "--rig", "hall", "--tries", "1"];

@@ -139,14 +139,14 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     );
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use crate::common::PACED;
 
     use super::*;
 
     #[test]
+    #[ignore = "takes long"]
     fn a_deployment_is_measured_with_all_cameras_and_with_a_dead_one() {
         let case = Case::new("latency", &[60; 3], PACED);
         let words = [

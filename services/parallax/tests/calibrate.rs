@@ -114,8 +114,7 @@ fn a_room_from_people_is_made_step_by_step() {
     );
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use calibration::differences;
     use geometry::Camera;
@@ -157,6 +156,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn a_camera_that_was_turned_is_put_right_and_a_rig_that_is_right_is_kept() {
         let case = Case::new("calibrate", &[1, 1], "");
         let who = ["--rig", "ring:3", "--subjects", "5", "--seed", "5"];

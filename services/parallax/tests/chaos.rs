@@ -61,8 +61,7 @@ fn scenarios_are_listed_and_impossible_ones_refused() {
     assert!(ended.stderr.contains("--list"), "{}", ended.stderr);
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use serde_json::json;
 
@@ -72,6 +71,7 @@ mod long {
     const PATIENT: [&str; 4] = ["--max-return-ms", "60000", "--max-pause-ms", "60000"];
 
     #[test]
+    #[ignore = "takes long"]
     fn in_a_realtime_run_a_hung_process_is_detected_by_its_missing_progress() {
         // The time limit alone would only detect the hang after ten minutes.
         let live = PACED.replace("\"paced\"", "\"realtime\"");
@@ -89,6 +89,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
         let case = Case::new("chaos", &[80; 3], PACED);
         let (ended, report) = chaos(
@@ -140,6 +141,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
         let live = PACED.replace("\"paced\"", "\"realtime\"");
         let case = Case::new("chaos-camera", &[160; 3], &live);

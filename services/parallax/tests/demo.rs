@@ -147,12 +147,12 @@ fn a_killed_camera_was_lost_and_not_late(case: &Case, killed: &Value) {
     }
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use super::*;
 
     #[test]
+    #[ignore = "takes long"]
     fn a_missed_limit_of_the_demo_is_named_and_has_its_own_exit_code() {
         let impossible = ["--frames", "12", "--no-kill", "--min-pcp3d", "101"];
         let (case, ended, report) = demo("demo-missed", &impossible);

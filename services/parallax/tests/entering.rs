@@ -1,8 +1,7 @@
 //! Test of a room that a person enters and leaves, from rendered pictures to skeletons, without any settings.
-#![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-/// Long tests; see `.ci/run`.
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use std::ops::Range;
     use std::path::PathBuf;
@@ -39,6 +38,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn an_empty_room_has_no_skeleton_and_who_enters_has_one() {
         let case = Case::new("entering", &[1, 1], "");
         let who = ["--rig", "ring:4", "--subjects", "907", "--seed", "12"];

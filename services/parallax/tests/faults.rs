@@ -263,12 +263,12 @@ fn assert_back_after_a_gap(lines: &[Value]) {
     assert!(there > lost, "it is not back: {lines:?}");
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use super::*;
 
     #[test]
+    #[ignore = "takes long"]
     fn a_process_whose_model_is_gone_at_its_restart_is_given_up_and_the_run_goes_on() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);

@@ -1,9 +1,8 @@
 //! Tests with a person in a handstand, a lying person, and a person who runs while frames are half a second apart. They cover a whole run,
 //! from rendered pictures to skeletons.
-#![cfg(feature = "long-tests")]
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-/// Long tests; see `.ci/run`.
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use std::collections::BTreeMap;
 
@@ -128,6 +127,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn who_stands_on_the_hands_is_found() {
         let case = case("handstand", "gestures", 15);
         let turned = turn_world(&case);
@@ -139,6 +139,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn who_lies_is_found() {
         let case = case("lying", "lying", 15);
         run(&case, &[]);
@@ -150,6 +151,7 @@ mod long {
 
     /// Simulates a machine that has time for half of the people.
     #[test]
+    #[ignore = "takes long"]
     fn who_is_not_looked_at_in_every_frame_is_predicted() {
         let case = case("predicted", "walking", 30);
         run(&case, &["--set", "network.looks=0.6"]);
@@ -164,6 +166,7 @@ mod long {
 
     /// Simulates a slow machine: frames are far apart, and few of them are searched.
     #[test]
+    #[ignore = "takes long"]
     fn who_runs_is_followed_over_half_a_second_without_a_search() {
         let case = case("apart", "jogging", 2);
         run(&case, &["--set", "network.find_every=1000"]);

@@ -19,7 +19,6 @@ mod gpu;
 mod handstand;
 mod live;
 mod maps;
-#[cfg(feature = "long-tests")]
 mod memory;
 mod networks;
 mod nonsense;

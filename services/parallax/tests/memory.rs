@@ -66,6 +66,7 @@ fn noise(seed: u64) -> Canvas {
 }
 
 #[test]
+#[ignore = "takes long"]
 fn a_pose_process_stays_under_300_megabytes_at_640x480() {
     let more = "[capture]\nscale = 1\nupright = false\n[results]\noverlay_every = 0\n";
     let rig = rig();

@@ -232,8 +232,7 @@ fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
     case.assert_nothing_left();
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     #![expect(clippy::print_stderr, reason = "what is skipped is told")]
 
@@ -247,6 +246,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn the_python_package_reads_a_real_deployment() {
         let python = "python3";
         if !is_able(python) {

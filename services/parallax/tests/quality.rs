@@ -213,8 +213,7 @@ fn a_prediction_that_never_ends_is_detected_by_its_missing_progress() {
     assert_eq!(spun["run"]["restarts"], expected, "{}", ended.stderr);
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use crate::common::started::signal;
 
@@ -227,6 +226,7 @@ mod long {
     }
 
     #[test]
+    #[ignore = "takes long"]
     fn no_frame_waits_for_a_suspended_network() {
         let more = "[capture]\nupright = false\nmode = \"realtime\"\n\
                     frame_rate_hz = 5\n[results]\noverlay_every = 0\n\

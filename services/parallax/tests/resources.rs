@@ -262,12 +262,12 @@ fn no_process_of_a_run_has_a_network_socket() {
     assert_eq!(started.wait().status.code(), Some(0));
 }
 
-/// Long tests; see `.ci/run`.
-#[cfg(feature = "long-tests")]
+/// Tests that take long; `cargo test -- --ignored` runs them.
 mod long {
     use super::*;
 
     #[test]
+    #[ignore = "takes long"]
     fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("filled", &[300; 3], &more);
