@@ -60,13 +60,10 @@ const LAYERS: &[(&str, &[&str])] = &[
         &[
             "bridge",
             "capture",
-            "fuse",
-            "pose",
-            "quality",
             "record",
             "results",
+            "steps",
             "supervise",
-            "triangulate",
         ],
     ),
     ("whole runs", &["launch", "trials", "view"]),
@@ -101,6 +98,26 @@ fn crates_depend_downwards() {
                 );
             }
             assert_ne!(dependency, "testkit", "{name}: testkit is for tests only");
+        }
+    }
+}
+
+#[test]
+fn steps_do_not_call_each_other() {
+    let steps = ["fuse", "pose", "quality", "triangulate"];
+    let (_, dir) = crates().into_iter().find(|(name, _)| name == "steps").unwrap();
+    let of_step = |file: &Path, step: &str| {
+        let inside = file.strip_prefix(dir.join("src")).unwrap();
+        inside.starts_with(step) || inside == Path::new(&format!("{step}.rs"))
+    };
+    for file in rust_files(&dir) {
+        let text = fs::read_to_string(&file).unwrap();
+        for step in steps.into_iter().filter(|step| !of_step(&file, step)) {
+            assert!(
+                !text.contains(&format!("crate::{step}")),
+                "{} uses {step}: processes exchange messages",
+                file.display()
+            );
         }
     }
 }

@@ -7,6 +7,7 @@ use keypoints::files::SeenKeypoints;
 use pipeline::{
     NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
 };
+use steps::pose;
 
 use crate::prepare::{Prepared, space_settings, who_settings};
 use crate::process::{most_apart, view_step};

@@ -3,6 +3,7 @@
 use core::time::Duration;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use steps::quality;
 
 use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};

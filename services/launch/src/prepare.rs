@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use steps::{fuse, pose, quality, triangulate};
 
 use deployment::Deployment;
 use deployment::paper::Errors;

@@ -6,6 +6,7 @@ pub(crate) mod view_step;
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use steps::{fuse, pose, quality, triangulate};
 
 use deployment::Stage;
 use failure::{ExitKind, Failure, OrFail as _};

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use crate::common;
+use steps::{fuse, pose};
 
 use std::fmt::Write as _;
 

@@ -9,6 +9,7 @@ mod several;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::{Arc, Mutex};
+use steps::fuse;
 
 use clap::Args;
 use deployment::energy_numbers;

@@ -3,6 +3,7 @@
 use deployment::{Stage, Topology};
 use pipeline::LookBudget;
 use runtime::Delivery;
+use steps::pose;
 
 use crate::resolved::Resolved;
 use crate::sanity::n_cores;

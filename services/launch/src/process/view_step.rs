@@ -1,6 +1,7 @@
 //! The single-view step of a camera: searches the pictures with a network or with filters, or reads another program's keypoints.
 
 use std::sync::Arc;
+use steps::pose;
 
 use failure::{ExitKind, Failure, OrFail as _};
 use pipeline::{Eyes, NetworkSettings, NetworkStep, ViewStep};

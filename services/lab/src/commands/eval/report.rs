@@ -4,6 +4,7 @@ use deployment::paper::Config;
 use failure::Failure;
 use lab::eval::{self, Done, Job};
 use statistics::score::Bootstrap;
+use steps::fuse;
 use terminal::output;
 
 use super::Arguments;

@@ -5,7 +5,7 @@ use keypoints::files::SeenKeypoints;
 use messages::Stamp;
 use pipeline::{LookBudget, NetworkMemory};
 
-use crate::job::{Job, Looks};
+use crate::pose::job::{Job, Looks};
 
 /// State that is kept from frame to frame.
 pub(crate) enum Memory {

@@ -10,8 +10,8 @@ use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Turn};
 use wire::{EvidenceView, WireError};
 
-use crate::input::Input;
-use crate::job::Job;
+use crate::fuse::input::Input;
+use crate::fuse::job::Job;
 
 /// The inputs of one frame.
 struct FrameViews<'a> {

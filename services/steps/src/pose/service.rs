@@ -5,9 +5,9 @@ use messages::topic;
 use runtime::Service;
 use stage::{Range, Stage};
 
-use crate::job::{Job, Step};
-use crate::memory::{Memory, NetworkState};
-use crate::view::View;
+use crate::pose::job::{Job, Step};
+use crate::pose::memory::{Memory, NetworkState};
+use crate::pose::view::View;
 
 /// Searches every frame of one view, until the footage ends or a stop is requested.
 ///

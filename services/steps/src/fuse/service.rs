@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::input::{Candidates, Input, expected_errors};
-use crate::job::Job;
-use crate::worker::Worker;
+use crate::fuse::input::{Candidates, Input, expected_errors};
+use crate::fuse::job::Job;
+use crate::fuse::worker::Worker;
 use failure::Failure;
 use messages::{ViewPose, topic};
 use pipeline::Following;

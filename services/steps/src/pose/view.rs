@@ -12,8 +12,8 @@ use runtime::{Loan, Sample, Service, SlicePublisher};
 use stage::{Output, StreamFrame, Turn};
 use wire::WireError;
 
-use crate::job::{Job, Step};
-use crate::memory::Memory;
+use crate::pose::job::{Job, Step};
+use crate::pose::memory::Memory;
 
 /// Poses found in a frame, and the evidence if a process receives it.
 pub(crate) struct Found<'a> {

@@ -1,5 +1,4 @@
 //! Computes joints in the world: receives the people of a frame with the evidence, or the poses of pairs, and sends skeletons.
-#![forbid(unsafe_code)]
 
 mod in_space;
 mod service;

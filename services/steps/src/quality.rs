@@ -1,5 +1,4 @@
 //! Predicts the expected error of every part: receives frames and candidates, and sends expected errors.
-#![forbid(unsafe_code)]
 
 mod service;
 mod settings;

@@ -1,5 +1,4 @@
 //! Finds people in single views: receives frames, and sends candidates with their evidence.
-#![forbid(unsafe_code)]
 
 mod by_keypoints;
 mod by_network;

@@ -6,8 +6,8 @@ use messages::{Searched, Stamp, Status, ViewPose};
 use pipeline::{NetworkMemory, NetworkStep};
 use posenetwork::{MapGrid, PersonMaps};
 
-use crate::memory::NetworkState;
-use crate::view::{Found, View};
+use crate::pose::memory::NetworkState;
+use crate::pose::view::{Found, View};
 
 impl View<'_> {
     /// Searches a frame. If the network fails, the frame is refused, with a warning the first time.

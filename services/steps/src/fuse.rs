@@ -1,6 +1,5 @@
 //! Fuses the candidates of all views. If networks find the people, sends the identities of people. With the paper's method, sends the poses
 //! of camera pairs.
-#![forbid(unsafe_code)]
 
 mod input;
 mod job;

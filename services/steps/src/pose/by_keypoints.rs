@@ -3,9 +3,9 @@
 use failure::Failure;
 use messages::{Stamp, Status};
 
-use crate::job::Keypoints;
-use crate::memory::KeypointState;
-use crate::view::{Found, View};
+use crate::pose::job::Keypoints;
+use crate::pose::memory::KeypointState;
+use crate::pose::view::{Found, View};
 
 impl View<'_> {
     /// Reads the people of a frame. If the file cannot be read, the frame is refused, with a warning the first time. A frame without a file
