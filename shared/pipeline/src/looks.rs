@@ -17,7 +17,7 @@ const LEAST_BEHIND: usize = 7;
 /// Minimum heat of a new person, as a fraction of the heat of the best person in the frame; a fainter detection is often a chair or a
 /// poster.
 const FAINT: f64 = 0.7;
-/// Minimum heat (0 to 1) at which a joint is used to compute the person's position.
+/// Minimum heat (0 to 1) at which a joint is used to compute the position or motion of the person.
 const SURE: f64 = 0.2;
 
 /// Runs the network on the people of a frame, one after another.
@@ -65,8 +65,8 @@ fn best_box(outlines: &[[f64; 4]], outline: [f64; 4]) -> Option<usize> {
 ///
 /// * `n_frames`: number of frames since the last run of the network on this person.
 fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>) -> Option<Pace> {
-    let moved = shift(&before?.maps, &seen.maps)?;
-    Some(Pace::next(track.pace, moved, n_frames?))
+    let moved = shift(&before?.maps, &seen.maps, SURE)?;
+    Some(Pace::next(track.pace, &moved, n_frames?))
 }
 
 impl Looks<'_> {

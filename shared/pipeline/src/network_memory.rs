@@ -3,9 +3,10 @@
 use multiview::FrontEvidence;
 use posenetwork::{Bar, JointMaps, LookMemory, Turn, overlap};
 use skeleton::MIRRORED;
+use skeleton::body::N_JOINTS;
 use statistics::Sorted;
 
-use crate::tracks::{Pace, Track, wider};
+use crate::tracks::{Moved, Pace, Track, wider};
 
 /// Maximum distance at which two joints count as the same, as a fraction of the height of the network's window. The next constant is the
 /// fraction of joints that two sightings of the same person have in common, with left and right as labelled or swapped.
@@ -286,25 +287,45 @@ fn in_common(first: &JointMaps, second: &JointMaps) -> f64 {
     share(&|joint| joint).max(share(&|joint| MIRRORED[joint]))
 }
 
-/// Returns the displacements of the joints from one sighting to another.
-fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = [f64; 2]> {
+/// Returns the displacement of each joint from one sighting to another, in pixels; `None` for joints that one of them lacks.
+fn steps(first: &JointMaps, second: &JointMaps) -> impl Iterator<Item = Option<Step>> {
     let both = first.peaks().iter().zip(second.peaks());
-    both.filter_map(|(a, b)| {
-        let [a, b] = [a.as_ref()?.at, b.as_ref()?.at];
-        Some([b[0] - a[0], b[1] - a[1]])
+    both.map(|(a, b)| {
+        let (a, b) = (a.as_ref()?, b.as_ref()?);
+        Some(Step {
+            by: [b.at[0] - a.at[0], b.at[1] - a.at[1]],
+            score: a.score.min(b.score),
+        })
     })
+}
+
+/// Displacement of a joint between two sightings.
+struct Step {
+    by: [f64; 2],
+    /// Lower one of the two heats, 0 to 1.
+    score: f64,
 }
 
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     Sorted::new(values.collect::<Vec<f64>>()).upper_median()
 }
 
-/// Returns the displacement of a whole person from one sighting to another, as a fraction of the height of the first window. It is the
-/// median over the joints along each axis, so that errors of single joints have little effect.
-pub(crate) fn shift(first: &JointMaps, second: &JointMaps) -> Option<[f64; 2]> {
+/// Returns the displacement of a person from one sighting to another, as fractions of the height of the first window. The displacement of
+/// the whole person is the median over the joints along each axis, so that errors of single joints have little effect.
+///
+/// * `least_score`: minimum heat of a joint in both sightings for its own displacement, 0 to 1.
+pub(crate) fn shift(first: &JointMaps, second: &JointMaps, least_score: f64) -> Option<Moved> {
     let [_, top, _, bottom] = first.extent();
-    let along = |axis: usize| median(steps(first, second).map(|step| step[axis]));
-    Some([along(0)?, along(1)?].map(|along| along / (bottom - top)))
+    let along = |axis: usize| median(steps(first, second).flatten().map(|step| step.by[axis]));
+    let share = |by: [f64; 2]| by.map(|along| along / (bottom - top));
+    let mut joints = [None; N_JOINTS];
+    for (joint, step) in joints.iter_mut().zip(steps(first, second)) {
+        *joint = step.filter(|step| step.score >= least_score).map(|step| share(step.by));
+    }
+    Some(Moved {
+        whole: share([along(0)?, along(1)?]),
+        joints,
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Where to look for the people of a view in the next frame.
 
 use posenetwork::Turn;
+use skeleton::body::N_JOINTS;
 
 /// Fraction of the distance to the box around the pose by which each side of the search box moves inward per frame.
 const INWARD: f64 = 0.5;
@@ -17,6 +18,9 @@ const MOST_MOVED: f64 = 1.0;
 /// Maximum displacement of a person who stands still, as a fraction of the height of the network's window; less than the error
 /// of the network.
 const STILL: f64 = 0.01;
+/// Maximum displacement of every joint of a person who stands still, as a fraction of the height of the network's window. A person who
+/// stands on one leg and swings the other one has to be looked at.
+const STILL_JOINT: f64 = 0.02;
 /// If a person's last step exceeds this multiple of [`STILL`], the person has moved, whatever the mean velocity.
 const MOST_STEP: f64 = 3.0;
 /// Weight of the earlier velocity after a frame. It is high because, between two frames, the error of the network exceeds the motion of a
@@ -54,28 +58,57 @@ pub(crate) struct Pace {
     velocity: [f64; 2],
     /// Distance between the last two sightings.
     step: f64,
+    /// Mean velocity of every joint.
+    joints: [[f64; 2]; N_JOINTS],
+}
+
+/// Displacement of a person between two sightings, as fractions of the height of the network's window.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moved {
+    pub(crate) whole: [f64; 2],
+    /// Displacement of every joint; `None` for joints that are not clearly visible.
+    pub(crate) joints: [Option<[f64; 2]>; N_JOINTS],
 }
 
 impl Pace {
     /// Returns the motion after another sighting.
     ///
     /// * `moved`, `n_frames`: displacement and number of frames since the last sighting.
-    pub(crate) fn next(before: Option<Self>, moved: [f64; 2], n_frames: u64) -> Self {
+    pub(crate) fn next(before: Option<Self>, moved: &Moved, n_frames: u64) -> Self {
         let n_frames = n_frames.max(1) as f64;
-        let now = moved.map(|moved| moved / n_frames);
-        let (kept, last) =
-            before.map_or((0.0, now), |before| (KEPT.powf(n_frames), before.velocity));
-        let velocity = core::array::from_fn(|axis| kept * last[axis] + (1.0 - kept) * now[axis]);
-        Self {
-            velocity,
-            step: moved[0].hypot(moved[1]),
+        let kept = if before.is_some() {
+            KEPT.powf(n_frames)
+        } else {
+            0.0
+        };
+        let mean = |last: [f64; 2], by: [f64; 2]| -> [f64; 2] {
+            core::array::from_fn(|axis| kept * last[axis] + (1.0 - kept) * (by[axis] / n_frames))
+        };
+        let last = before.map_or([0.0; 2], |before| before.velocity);
+        let mut joints = before.map_or([[0.0; 2]; N_JOINTS], |before| before.joints);
+        for (velocity, by) in joints.iter_mut().zip(&moved.joints) {
+            *velocity = by.map_or(*velocity, |by| mean(*velocity, by));
         }
+        Self {
+            velocity: mean(last, moved.whole),
+            step: moved.whole[0].hypot(moved.whole[1]),
+            joints,
+        }
+    }
+
+    /// Returns the mean speed of the fastest joint per frame.
+    fn fastest_joint(&self) -> f64 {
+        let speeds = self.joints.iter().map(|[x, y]| x.hypot(*y));
+        speeds.fold(0.0, f64::max)
     }
 
     /// Returns true if a person with this motion hardly moves in `n_frames` frames.
     fn is_still(&self, n_frames: u64) -> bool {
         let [x, y] = self.velocity;
-        self.step <= MOST_STEP * STILL && x.hypot(y) * n_frames as f64 <= STILL
+        let n_frames = n_frames as f64;
+        self.step <= MOST_STEP * STILL
+            && x.hypot(y) * n_frames <= STILL
+            && self.fastest_joint() * n_frames <= STILL_JOINT
     }
 }
 
@@ -171,6 +204,14 @@ mod tests {
 
     const BOX: [f64; 4] = [100.0, 50.0, 180.0, 250.0];
 
+    /// A displacement of the whole person, with all joints.
+    fn by(whole: [f64; 2]) -> Moved {
+        Moved {
+            whole,
+            joints: [Some(whole); N_JOINTS],
+        }
+    }
+
     #[test]
     fn a_side_moves_outward_at_once_and_inward_step_by_step() {
         let around = [90.0, 150.0, 170.0, 260.0];
@@ -193,7 +234,7 @@ mod tests {
         let track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -18.0), 6.0);
         assert!(!track.is_still(1), "one look tells no pace");
         let with = |speed: f64| Track {
-            pace: Some(Pace::next(None, [0.0, speed], 1)),
+            pace: Some(Pace::next(None, &by([0.0, speed]), 1)),
             ..track
         };
         let longest = |speed: f64| (1..=8).filter(|n| with(speed).is_still(*n)).count();
@@ -209,7 +250,7 @@ mod tests {
     fn the_network_runs_first_on_the_person_who_may_have_moved_farthest() {
         let track = Track::next(((BOX, Turn::Up), None), (BOX, -20.0), 6.0);
         let with = |speed: f64| Track {
-            pace: Some(Pace::next(None, [speed, 0.0], 1)),
+            pace: Some(Pace::next(None, &by([speed, 0.0]), 1)),
             ..track
         };
         assert!(
@@ -229,7 +270,7 @@ mod tests {
     fn errors_of_the_network_are_no_movement_and_steps_are() {
         let after = |moved: &[f64]| {
             let looks = moved.iter().fold(None, |before, moved| {
-                Some(Pace::next(before, [*moved, 0.0], 1))
+                Some(Pace::next(before, &by([*moved, 0.0]), 1))
             });
             looks.unwrap()
         };
@@ -242,6 +283,21 @@ mod tests {
             1,
             "a person who begins to walk is not held over the next frame"
         );
+    }
+
+    #[test]
+    fn who_stands_on_one_leg_and_swings_the_other_one_is_no_more_still() {
+        let swing = |swing: Option<f64>| {
+            let mut moved = by([0.0; 2]);
+            moved.joints[3] = swing.map(|swing| [swing, 0.0]);
+            let first = Pace::next(None, &by([0.0; 2]), 1);
+            let pace = (0..5).fold(first, |pace, _| Pace::next(Some(pace), &moved, 1));
+            (1..=8).filter(|n| pace.is_still(*n)).count()
+        };
+        assert_eq!(swing(Some(0.001)), 8);
+        assert_eq!(swing(Some(0.01)), 2);
+        assert_eq!(swing(Some(0.03)), 0);
+        assert_eq!(swing(None), 8, "a hidden joint");
     }
 
     #[test]
