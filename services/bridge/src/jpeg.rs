@@ -40,7 +40,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_survives_nearly() {
+    fn a_decoded_frame_is_nearly_equal_to_the_original() {
         let size = [48, 32];
         let rgb = picture(size);
         let jpeg = encode(&rgb, size, 90).unwrap();
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_picture_of_its_size_is_refused() {
+    fn bytes_that_are_not_a_picture_of_the_expected_size_are_refused() {
         let jpeg = encode(&picture([48, 32]), [48, 32], 90).unwrap();
         assert!(decode(&jpeg, [32, 48]).is_none());
         assert!(decode(&jpeg[..jpeg.len() / 8], [48, 32]).is_none());

@@ -168,7 +168,7 @@ mod tests {
 
     #[cfg(feature = "zenoh")]
     #[test]
-    fn keys_are_made_once_for_their_user_alone() {
+    fn keys_are_created_once_and_only_their_user_can_read_them() {
         use std::os::unix::fs::PermissionsExt as _;
 
         let folder = tempfile::tempdir().unwrap();

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_host_that_fuses_listens_and_with_keys_over_tls_alone() {
+    fn only_the_fusing_host_listens_and_with_keys_it_accepts_tls_only() {
         for listens in [true, false] {
             for keys in [true, false] {
                 let text = config(&address(listens, keys));
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_speaks_and_hears_for_itself_alone() {
+    fn a_host_may_only_send_and_receive_its_own_topics() {
         let folder = tempfile::tempdir().unwrap();
         let names = ["desk", "rack", "shelf"];
         let of_desk = vec!["127.0.0.1".to_owned()];

@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn evidence_crosses() {
+    fn evidence_survives_the_transfer_between_hosts() {
         let view = view(1 << 20);
         let checked = view.unpack(&maps().to_bytes()).unwrap();
         let mut values = vec![0.0; checked.n_values()];
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_view_cannot_have_is_refused_with_the_number() {
+    fn maps_that_do_not_fit_the_view_are_refused_with_the_number() {
         let refused = |change: fn(&mut Maps), longest| {
             let mut maps = maps();
             change(&mut maps);
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn poses_and_maps_of_a_body_come_back_whole() {
+    fn poses_and_maps_survive_joining_and_splitting() {
         let mut poses = Vec::new();
         recording::encode(Kind::ViewPose, &[7; 900], &[], &mut poses);
         let body = join(&poses, b"maps");

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_newest_durations_count() {
+    fn only_the_newest_durations_count() {
         let mut it = Timing::default();
         assert_eq!(it.percentiles(), None);
         for nth in 0..10_000_u64 {

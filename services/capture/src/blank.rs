@@ -171,7 +171,7 @@ mod tests {
     const ADDRESS: &str = "blank://64x48?frames=7&rate=29.97";
 
     #[test]
-    fn an_address_is_written_as_it_is_read() {
+    fn an_address_is_written_in_the_form_in_which_it_is_read() {
         let blank = Blank::parse(ADDRESS).unwrap();
         assert_eq!((blank.size, blank.n_frames), (Size::new(64, 48), 7));
         assert_eq!(blank.to_string(), ADDRESS);
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn addresses_that_cannot_be_are_refused_with_what_is_wrong() {
+    fn impossible_addresses_are_refused_with_the_reason() {
         for (address, words) in [
             ("blank.mp4", "does not begin with `blank://`"),
             ("blank://?frames=1&rate=1", "width and height are missing"),

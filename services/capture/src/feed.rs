@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_a_scene_are_selected_like_those_of_footage() {
+    fn frames_of_a_scene_are_selected_like_frames_of_footage() {
         let whole = frames(&SourceSpec::new(PATH), 0);
         assert_eq!(whole.len(), 10);
         let part = SourceSpec {
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn grey_frames_are_selected_like_those_of_footage_and_never_frozen() {
+    fn grey_frames_are_selected_like_frames_of_footage_and_never_count_as_frozen() {
         const GREY: &str = "blank://32x16?rate=20&frames=10";
         let whole = frames(&SourceSpec::new(GREY), 0);
         assert_eq!(whole.len(), 10);

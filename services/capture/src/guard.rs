@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_frozen_from_the_nth_repetition_until_it_changes() {
+    fn a_picture_counts_as_frozen_from_the_nth_repetition_until_it_changes() {
         let frozen = Some(Status::FROZEN);
         let got = of_pictures(2, &[1, 1, 2, 2, 2, 2, 3, 3]);
         assert_eq!(got, [None, None, None, None, frozen, frozen, None, None]);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_decreasing_and_jumping_timestamps_are_faults() {
+    fn repeated_decreasing_and_jumping_timestamps_are_clock_faults() {
         let [same, back, jump] = [
             Status::TIME_REPEATED,
             Status::TIME_WENT_BACK,

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn every_instant_has_the_nearest_picture() {
+    fn every_instant_gets_the_nearest_picture() {
         let clock = |rate_hz: f64, offset_s: f64| OwnClock {
             rate_hz,
             offset_s,

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_host_takes_what_the_first_has_no_cores_for() {
+    fn a_second_host_takes_the_processes_for_which_the_first_has_no_cores() {
         let load = Load {
             n_cameras: 16,
             ..LOAD
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_cross_keep_pose_where_fusion_is() {
+    fn if_frames_are_transferred_the_poses_are_computed_on_the_fusing_host() {
         let load = Load {
             n_cameras: 16,
             n_hosts: 3,
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn views_that_are_given_are_not_spread() {
+    fn a_given_split_of_the_views_is_not_changed() {
         let load = Load {
             n_hosts: 3,
             near: Some(3),

@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_interval_of_a_share_is_wilsons() {
+    fn the_interval_of_a_fraction_is_the_wilson_interval() {
         let [low, high] = wilson(8, 10);
         assert!((low - 0.490).abs() < 1e-3 && (high - 0.943).abs() < 1e-3);
         assert_eq!(wilson(0, 0), [0.0, 1.0]);

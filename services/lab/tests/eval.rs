@@ -92,7 +92,7 @@ fn people(case: &Case) -> &'static str {
 }
 
 #[test]
-fn single_pictures_are_evaluated_as_by_model_judge() {
+fn single_pictures_get_the_same_results_as_from_model_judge() {
     let case = case(3, 3);
     let people = people(&case);
     let who = [people, "--only", "2-8", "--json"];

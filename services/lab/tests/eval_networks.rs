@@ -68,7 +68,7 @@ fn eval(case: &Case, more: &[&str]) -> Ended {
 }
 
 #[test]
-fn every_stress_has_a_row_for_every_way_of_solving() {
+fn every_stress_test_has_a_row_for_every_solver() {
     let case = case("eval-networks", 0.9);
     let ended = eval(&case, &["--stress", "all", "--json"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -96,7 +96,7 @@ fn every_stress_has_a_row_for_every_way_of_solving() {
 }
 
 #[test]
-fn a_detector_that_finds_nobody_leaves_every_joint_unfound() {
+fn if_the_detector_finds_nobody_every_joint_counts_as_not_found() {
     let case = case("eval-nobody", 0.1);
     let ended = eval(&case, &["--json"]);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -108,7 +108,7 @@ fn a_detector_that_finds_nobody_leaves_every_joint_unfound() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_refused() {
+fn inputs_that_cannot_be_judged_are_refused() {
     let case = case("eval-networks-refused", 0.9);
     let refused = |more: &[&str], code: i32, words: &str| {
         let ended = eval(&case, more);

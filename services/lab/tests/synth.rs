@@ -102,7 +102,7 @@ fn the_default_model_finds_the_person() {
 }
 
 #[test]
-fn a_run_among_others_follows_one_person_and_counts_all() {
+fn a_run_with_several_people_follows_one_person_and_counts_all() {
     let case = case("synth-others");
     let crowd = ["--rig", "ring:3:5", "--subjects", "907", "--others", "1"];
     let motion = ["--actions", "boxing", "--frames", "5", "--rate", "10"];
@@ -203,7 +203,7 @@ fn a_live_scene_keeps_up_with_the_clock() {
 }
 
 #[test]
-fn the_ground_truth_is_the_projection_by_the_exact_rig() {
+fn the_ground_truth_is_projected_with_the_exact_rig() {
     let case = case("synth-truth");
     let flaws = [
         "flawed",
@@ -273,7 +273,7 @@ fn the_output_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn several_sequences_have_a_folder_each_and_one_list_of_people() {
+fn each_sequence_has_its_own_folder_and_all_share_one_list_of_people() {
     let case = case("synth-many");
     let many = [
         "many",
@@ -335,7 +335,7 @@ fn truth(case: &Case, folder: &str) -> (Header, Vec<Frame>) {
 }
 
 #[test]
-fn recorded_motion_is_performed_by_another_person() {
+fn recorded_motion_can_be_performed_by_another_person() {
     let case = case("synth-motion");
     let first = ["first", "--live", "--rig", "ring:2", "--actions", "boxing"];
     let ended = synth(

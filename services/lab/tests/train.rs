@@ -174,7 +174,7 @@ fn is_gone(path: &Path) -> bool {
 }
 
 #[test]
-fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
+fn a_trained_model_finds_new_figures_for_any_number_of_threads_and_after_kills() {
     let drawn = Drawn::new(14);
     for name in ["one", "two", "killed"] {
         fs::create_dir(drawn.path(name)).unwrap();
@@ -215,7 +215,7 @@ fn a_trained_model_finds_other_figures_with_any_threads_and_after_kills() {
 }
 
 #[test]
-fn an_interrupted_training_reports_how_to_continue_and_refuses_foreign_state() {
+fn an_interrupted_training_prints_how_to_continue_and_refuses_checkpoints_of_other_trainings() {
     let drawn = Drawn::new(14);
     let stopped = drawn.begun("m.fmp");
     signal("INT", stopped.id());
@@ -262,7 +262,7 @@ fn add_bad_labels(drawn: &Drawn) {
 }
 
 #[test]
-fn bad_labels_are_reported_and_counted_or_fatal() {
+fn bad_labels_are_reported_and_are_fatal_if_requested() {
     let drawn = Drawn::new(14);
     add_bad_labels(&drawn);
     drawn.write("negatives/9.png", "no image");

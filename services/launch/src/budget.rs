@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_latency_equal_to_the_budget_is_held() {
+    fn a_latency_equal_to_the_budget_meets_the_budget() {
         let budget = Budget::new(50.0, Some(&latency(100)));
         assert!(budget.is_held() && !budget.is_exceeded());
         assert_eq!(
@@ -161,7 +161,7 @@ latency budget of 49.9 ms exceeded: the 99th percentile end to end is 50.0 ms (1
     }
 
     #[test]
-    fn an_unmeasured_budget_is_neither_held_nor_exceeded() {
+    fn a_budget_without_measurement_is_neither_met_nor_exceeded() {
         for latency in [None, Some(LatencyReport::default()), Some(latency(0))] {
             let budget = Budget::new(1e9, latency.as_ref());
             assert!(!budget.is_held() && !budget.is_exceeded(), "{latency:?}");

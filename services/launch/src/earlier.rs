@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn results_are_replaced_when_asked_for_and_foreign_files_never() {
+    fn results_are_replaced_on_request_and_foreign_files_are_never_replaced() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path();
         make_way(&folder.join("not there"), false).unwrap();
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unfinished_run_is_not_lost_without_a_word() {
+    fn replacing_an_unfinished_run_prints_a_message() {
         let dir = tempfile::tempdir().unwrap();
         let part = dir.path().join("pose3d.jsonl.part");
         fs::write(&part, "").unwrap();
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_exported_goes_with_its_results_and_other_files_stay() {
+    fn exported_files_are_removed_with_their_results_and_other_files_stay() {
         let dir = tempfile::tempdir().unwrap();
         let export = dir.path().join("export");
         fs::create_dir(&export).unwrap();

@@ -370,7 +370,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_part_that_is_asked_for_is_within_the_footage() {
+    fn the_requested_part_is_limited_to_the_footage() {
         let part = |from_s, seconds| Part {
             every: 1,
             from_s,
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn what_one_camera_alone_has_is_not_compared() {
+    fn extra_keypoints_of_a_single_camera_are_not_compared() {
         let names =
             |all: &[&str]| -> Vec<String> { all.iter().map(|&name| name.to_owned()).collect() };
         let each = [

@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_are_looked_for_by_time_unless_it_is_told_how_often() {
+    fn the_interval_between_searches_is_a_time_unless_a_number_of_frames_is_set() {
         let default = Config::default();
         let by_rate = [60.0, 15.0, 2.5].map(|rate_hz| by(&default, Some(rate_hz)));
         assert_eq!(by_rate, [[30, 8], [10, 2], [10, 1]]);
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_followed_from_one_picture_to_another_that_may_be_of_any_time() {
+    fn every_frame_is_searched_if_the_frame_rate_is_low_or_unknown() {
         let default = Config::default();
         assert_eq!(by(&default, Some(2.4)), [1; 2]);
         assert_eq!(by(&default, None), [1; 2]);

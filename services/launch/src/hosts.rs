@@ -259,7 +259,7 @@ mod tests {
         [[host]]\nname = 'desk'\nfuses = true\naddress = 'x:1'\nviews = ['c0']\n[[host]]\nname = 'far'\nviews = ['c1']\n";
 
     #[test]
-    fn a_deployment_without_hosts_has_none_whatever_the_machine_is_called() {
+    fn a_deployment_without_hosts_ignores_the_name_of_the_machine() {
         let it = deployment("");
         assert_eq!(choose(&it, None, "far").unwrap(), None);
         let error = choose(&it, Some("far"), "far").unwrap_err();
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_is_named_or_is_the_machine() {
+    fn the_host_is_the_named_one_or_this_machine() {
         let it = deployment(HOSTS);
         if bridge::HAS_LINK {
             let chosen =
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_with_cameras_has_a_folder_of_its_own() {
+    fn a_host_with_cameras_has_its_own_folder() {
         let it = deployment(HOSTS);
         assert_eq!(part(&it, &it.hosts[0]), it);
         assert_eq!(part(&it, &it.hosts[1]).output, Path::new("/o/far"));

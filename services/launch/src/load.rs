@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_maximal_number_of_cores_is_that_of_the_runtime() {
+    fn the_maximum_number_of_cores_equals_that_of_the_runtime() {
         assert_eq!(deployment::MAX_CORES, runtime::MAX_CORES);
     }
 }

@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_without_any_result_has_a_reason() {
+    fn a_run_without_any_result_reports_the_reason() {
         let dropped = reason_of(0, 0, &[view(30, 0), view(30, 0)]);
         assert!(dropped.contains("no frame has a result"), "{dropped}");
         assert!(dropped.contains("a: 0 of 30 frames"), "{dropped}");
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_room_without_people_is_a_reason_and_a_single_view_is_none() {
+    fn a_room_without_people_is_reported_as_the_reason_and_a_single_view_is_not() {
         let nobody = reason_of(3, 0, &[view(3, 0), view(3, 0)]);
         assert!(nobody.contains("nobody was found"), "{nobody}");
         assert_eq!(reason_of(3, 0, &[view(3, 3)]), "");

@@ -458,7 +458,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_a_lens_with_two_focal_lengths_are_shrunk_as_far_as_others() {
+    fn a_lens_with_two_focal_lengths_does_not_change_how_far_pictures_are_shrunk() {
         let rig = scene::RigChoice::parse("ring:2").unwrap().rig().unwrap();
         let mut camera = rig.cameras()[0].clone();
         let size = camera.intrinsics.size;

@@ -388,7 +388,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_camera_that_is_much_shorter_is_named_with_what_it_lacks() {
+    fn every_camera_with_much_shorter_footage_is_named_with_the_missing_length() {
         assert_eq!(shorter(&[("a", 100), ("b", 96)]), None);
         assert_eq!(shorter(&[("a", 6), ("b", 3)]), None, "too few to say");
         let text = shorter(&[("a", 30), ("b", 100), ("c", 90)]).unwrap();

@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn capture_and_results_do_not_poll() {
+    fn the_processes_capture_and_results_do_not_poll() {
         let text = "spin = true\npriority = { capture = 2 }";
         for process in ["pose-0", "quality-0", "fuse-1", "triangulate"] {
             assert_eq!(scheduling_of(text, process), "spin");

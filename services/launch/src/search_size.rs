@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_of_one_size_are_described_together_and_others_by_name() {
+    fn cameras_of_the_same_size_are_described_together_and_others_by_name() {
         let alike = size(&[(0.25, Some(690.0), false), (0.25, Some(710.0), false)], 2);
         assert_eq!(
             alike.text(),
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_small_is_warned_of_with_what_to_set() {
+    fn people_who_are_too_small_give_a_warning_with_the_setting_to_change() {
         let limited = size(&[(0.25, Some(300.0), true), (0.25, Some(700.0), false)], 2);
         let warning = limited.warning().unwrap();
         assert!(

@@ -380,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_on_their_sides_are_tried_next() {
+    fn cameras_rotated_by_90_degrees_are_tried_next() {
         let up = UnitVector3::new_normalize(Vector3::new(0.2, 0.9, -0.3));
         for roll in [90.0, -90.0] {
             let cameras = ring(&[roll; 4], up);
@@ -390,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn the_better_score_wins_and_level_cameras_where_scores_are_equal() {
+    fn the_better_score_wins_and_level_cameras_win_a_tie() {
         let tried = |score: Option<f64>, up| Hypothesis { up, score };
         let [z, y] = [Vector3::z_axis(), Vector3::y_axis()];
         let up = |level, other| choose(&[tried(level, z), tried(other, y)]).unwrap().up;

@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn every_command_has_a_page_and_every_shell_a_script() {
+    fn every_command_has_a_manual_page_and_every_shell_has_a_completion_script() {
         let folder = tempfile::tempdir().unwrap();
         let mut command = Cli::command();
         command.build();

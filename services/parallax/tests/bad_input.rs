@@ -103,7 +103,7 @@ fn footage() {
 }
 
 #[test]
-fn an_image_of_another_size_is_named_and_affects_its_own_frame_only() {
+fn an_image_of_another_size_is_named_and_affects_only_its_own_frame() {
     let case = Case::new("sizes", &[3; 2], PLAIN);
     picture(90, 128).save(case.path("b/0001.png")).unwrap();
     let ended = case.run();

@@ -69,7 +69,7 @@ fn two_processes_read_every_message_at_the_same_place_without_copying() {
 }
 
 #[test]
-fn a_hop_that_takes_longer_than_the_limit_is_a_missed_limit() {
+fn a_hop_longer_than_the_limit_misses_the_limit() {
     let case = Case::new("limit", &[1; 2], "");
     let more = ["--spin", "--max-polled-us", "0.001"];
     let (ended, report) = bench(&case, &[&SERIES[..], &more].concat());

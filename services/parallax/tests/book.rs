@@ -28,7 +28,7 @@ source = "right.mp4"
 "#;
 
 #[test]
-fn every_command_line_is_one_that_the_executable_takes() {
+fn every_command_line_in_the_book_is_accepted_by_the_executable() {
     let mut n = 0;
     for (place, line) in command_lines() {
         let Some(command) = line.ours() else {
@@ -43,7 +43,7 @@ fn every_command_line_is_one_that_the_executable_takes() {
 }
 
 #[test]
-fn a_command_line_that_is_wrong_is_found() {
+fn a_wrong_command_line_in_the_book_is_detected() {
     let wrong = [
         ("parallax runn my.toml", "a subcommand that is not there"),
         ("parallax run my.toml --no-such-flag", "a flag"),
@@ -76,7 +76,7 @@ fn a_command_line_that_is_wrong_is_found() {
 }
 
 #[test]
-fn what_commands_name_in_the_repository_is_there() {
+fn files_that_commands_name_exist_in_the_repository() {
     for (place, line) in command_lines() {
         if let Some(problem) = line.cargo_problem() {
             panic!("{place}: `{line}`: {problem}");
@@ -166,7 +166,7 @@ fn the_reference_has_every_topic_in_its_version() {
 }
 
 #[test]
-fn parts_of_deployment_files_are_accepted() {
+fn deployment_examples_are_accepted() {
     let mut n = 0;
     for (place, block) in all_blocks() {
         if !block.is("toml", "deployment") {
@@ -186,7 +186,7 @@ fn parts_of_deployment_files_are_accepted() {
 }
 
 #[test]
-fn links_lead_to_files_and_headings_that_are_there() {
+fn links_lead_to_existing_files_and_headings() {
     let problems = links::broken(&root(), &markdown_files());
     assert!(problems.is_empty(), "{}", problems.join("\n"));
 }
@@ -234,7 +234,7 @@ fn the_book_renders() {
 }
 
 #[test]
-fn functions_and_types_that_pages_name_are_in_their_crates() {
+fn functions_and_types_named_on_pages_exist_in_their_crates() {
     let mut n = 0;
     for file in markdown_files() {
         if !file.starts_with(root().join("docs")) {

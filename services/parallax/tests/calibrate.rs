@@ -14,7 +14,7 @@ fn rig(path: &Path) -> Rig {
 }
 
 #[test]
-fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
+fn the_floor_is_found_from_a_walking_person_and_not_used_with_another_rig() {
     let scene = sync::scene();
     let case = sync::case(&scene, scene.rig(), 400, |_, frame| {
         frame as f64 / sync::RATE_HZ
@@ -57,7 +57,7 @@ fn the_floor_is_found_where_somebody_walked_about_and_not_with_another_rig() {
 }
 
 #[test]
-fn a_room_that_is_kept_is_said_to_differ_from_new_options() {
+fn a_message_says_if_the_options_differ_from_the_existing_room() {
     let case = Case::new("new-kept", &[1, 1], "");
     let new =
         |camera: &str| case.start(&["new", "room", "--camera", camera, "--rig", "rig.toml"]).wait();
@@ -78,7 +78,7 @@ fn a_room_that_is_kept_is_said_to_differ_from_new_options() {
 }
 
 #[test]
-fn a_room_from_people_is_made_step_by_step() {
+fn a_room_is_calibrated_from_people_step_by_step() {
     let case = Case::new("new", &[1, 1], "");
     let cameras = ["--camera", "a=a.mp4", "--camera", "b=b.mp4"];
     let rig = ["--rig", "rig.toml"];
@@ -157,7 +157,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn a_camera_that_was_turned_is_put_right_and_a_rig_that_is_right_is_kept() {
+    fn a_rotated_camera_is_corrected_and_a_correct_rig_is_kept() {
         let case = Case::new("calibrate", &[1, 1], "");
         let who = ["--rig", "ring:3", "--subjects", "5", "--seed", "5"];
         let long = ["--frames", "60", "--rate", "10", "--no-masks"];

@@ -28,7 +28,7 @@ fn chaos(case: &Case, scenarios: &str, more: &[&str]) -> (Ended, Value) {
 }
 
 #[test]
-fn a_missed_limit_of_a_scenario_is_named_and_has_its_own_exit_code() {
+fn a_missed_limit_of_a_scenario_is_named_and_gives_exit_code_6() {
     let case = Case::new("chaos-missed", &[40; 2], PACED);
     let (ended, report) = chaos(&case, "kill-fuse", &["--max-return-ms", "0"]);
     assert_eq!(ended.status.code(), Some(6), "{}\n{report:#}", ended.stderr);
@@ -39,7 +39,7 @@ fn a_missed_limit_of_a_scenario_is_named_and_has_its_own_exit_code() {
 }
 
 #[test]
-fn scenarios_are_listed_and_impossible_ones_refused() {
+fn scenarios_are_listed_and_impossible_ones_are_refused() {
     let case = Case::new("chaos-list", &[2; 2], PACED);
     let ended = case.start(&["chaos", "--list"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
@@ -90,7 +90,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn a_killed_view_comes_back_and_after_a_killed_supervisor_the_next_run_works() {
+    fn a_killed_view_recovers_and_a_run_after_a_killed_supervisor_works() {
         let case = Case::new("chaos", &[80; 3], PACED);
         let (ended, report) = chaos(
             &case,
@@ -142,7 +142,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn a_failing_camera_is_reported_and_recovers_and_a_stalled_results_process_delays_no_other() {
+    fn a_failing_camera_recovers_and_a_stalled_results_process_delays_no_other_process() {
         let live = PACED.replace("\"paced\"", "\"realtime\"");
         let case = Case::new("chaos-camera", &[160; 3], &live);
         let (ended, report) = chaos(&case, "camera-unplug,camera-clock,stall-results", &PATIENT);

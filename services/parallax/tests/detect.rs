@@ -31,7 +31,7 @@ fn detect(case: &Case, more: &[&str]) -> (Ended, Vec<Value>) {
 }
 
 #[test]
-fn a_damaged_file_is_named_and_the_others_are_searched() {
+fn a_damaged_file_is_named_and_the_other_files_are_searched() {
     let (case, picture) = case("detect-broken", 3);
     let mut jpeg = Cursor::new(Vec::new());
     picture.to_rgb8().write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();

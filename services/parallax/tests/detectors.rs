@@ -76,7 +76,7 @@ const DETECT: [&str; 6] = [
 ];
 
 #[test]
-fn the_network_looks_into_every_box_of_the_detector() {
+fn the_network_searches_every_box_of_the_detector() {
     let case = case("detector-boxes");
     let card = ["--detector-card", "card.toml"];
     let line = parsed(&run(&case, &DETECT, &[&card[..], &["--json"]].concat()));
@@ -107,7 +107,7 @@ fn the_network_looks_into_every_box_of_the_detector() {
 }
 
 #[test]
-fn a_card_lies_beside_the_detector_or_in_it() {
+fn a_card_is_found_beside_the_detector_or_inside_its_file() {
     let case = case("detector-card");
     let ended = run(&case, &DETECT, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
@@ -136,7 +136,7 @@ fn a_card_lies_beside_the_detector_or_in_it() {
 }
 
 #[test]
-fn a_detector_that_finds_nobody_says_what_its_card_asks_for() {
+fn a_detector_that_finds_nobody_prints_the_expected_input_of_its_card() {
     let case = case("detector-nobody");
     case.write("det.toml", format!("least_score = 0.95{CARD}"));
     let ended = run(&case, &DETECT, &[]);
@@ -201,7 +201,7 @@ fn a_detector_is_explained_by_its_card_and_its_boxes_are_drawn() {
 }
 
 #[test]
-fn what_does_not_fit_is_named_with_the_numbers() {
+fn a_detector_that_does_not_match_its_card_is_refused_with_the_numbers() {
     let case = case("detector-misfit");
     let grids = ("codec = \"list\", boxes = \"dets\"", "codec = \"yolox\"");
     for ((from, to), words) in [
@@ -252,7 +252,7 @@ fn what_does_not_fit_is_named_with_the_numbers() {
 }
 
 #[test]
-fn numbers_are_of_the_type_that_the_card_says() {
+fn a_card_with_another_number_type_than_the_detector_is_refused() {
     let case = case("detector-numbers");
     let net = common::networks::detector_of([8.0, 8.0, 40.0, 40.0], 0.9);
     case.write("det.onnx", net.file());

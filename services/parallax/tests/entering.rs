@@ -39,7 +39,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn an_empty_room_has_no_skeleton_and_who_enters_has_one() {
+    fn an_empty_room_has_no_skeleton_and_a_person_who_enters_gets_one() {
         let case = Case::new("entering", &[1, 1], "");
         let who = ["--rig", "ring:4", "--subjects", "907", "--seed", "12"];
         let frames = ["--frames", &N_FRAMES.to_string(), "--rate", "10"];

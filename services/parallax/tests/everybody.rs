@@ -81,7 +81,7 @@ fn ids(lines: &[Value]) -> Vec<[Option<u64>; N_PEOPLE]> {
 }
 
 #[test]
-fn three_people_keep_their_identities_when_any_process_is_killed() {
+fn three_people_keep_their_ids_if_any_process_is_killed() {
     const VICTIMS: [&str; 4] = ["fuse", "pose --index 2", "triangulate", "fuse"];
     let n_frames = 60 * (VICTIMS.len() + 1);
     let case = Case::with_rig(&rig(), "everybody", &[0; 4], "");

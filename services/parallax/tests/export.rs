@@ -170,7 +170,7 @@ fn check_with_python(case: &Case) {
 
 /// The run has missing joints anywhere in a row, missing rows, and more frames than fit into 16 bits.
 #[test]
-fn programs_of_others_open_gaps_and_long_files() {
+fn other_programs_can_open_exports_with_gaps_and_long_exports() {
     let folder = tempfile::tempdir().unwrap();
     let joints = ["right_ankle", "neck", "head"];
     let frames: Vec<Vec<Option<[f64; 3]>>> = (0..8)
@@ -235,7 +235,7 @@ fn programs_of_others_open_gaps_and_long_files() {
 }
 
 #[test]
-fn joints_have_the_names_of_opensim_models_where_asked_for() {
+fn joints_have_opensim_names_on_request() {
     let case = Case::new("export-names", &[2; 2], PLAIN);
     let ended = case.start(&["run", "deployment.toml"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);

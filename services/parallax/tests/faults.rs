@@ -146,7 +146,7 @@ fn a_killed_capture_process_continues_with_the_next_frame() {
 }
 
 #[test]
-fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
+fn moving_the_folder_away_does_not_end_the_run_when_a_process_is_killed() {
     let case = Case::new("moved", &[N_FRAMES as usize; 3], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);
@@ -167,7 +167,7 @@ fn a_folder_that_is_moved_away_does_not_end_the_run_when_a_process_is_killed() {
 }
 
 #[test]
-fn a_killed_fusion_worker_loses_its_pairs_of_a_few_frames_only() {
+fn a_killed_fusion_worker_loses_only_the_pairs_of_a_few_frames() {
     let run = Signalled::new(PACED, "KILL", "fuse --index 0");
     run.assert_every_frame();
     assert_eq!(run.incomplete(), Vec::<&Value>::new());
@@ -269,7 +269,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn a_process_whose_model_is_gone_at_its_restart_is_given_up_and_the_run_goes_on() {
+    fn a_process_whose_model_is_missing_at_its_restart_is_abandoned_and_the_run_continues() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
         let mut started = case.start(&["run", "deployment.toml", "--json"]);

@@ -128,7 +128,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn who_stands_on_the_hands_is_found() {
+    fn a_handstand_is_found() {
         let case = case("handstand", "gestures", 15);
         let turned = turn_world(&case);
         let ended = run(&case, &[]);
@@ -140,7 +140,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn who_lies_is_found() {
+    fn a_lying_person_is_found() {
         let case = case("lying", "lying", 15);
         run(&case, &[]);
         let (error, share) = judged(&case, &Isometry3::identity());
@@ -152,7 +152,7 @@ mod long {
     /// Simulates a machine that has time for half of the people.
     #[test]
     #[ignore = "takes long"]
-    fn who_is_not_looked_at_in_every_frame_is_predicted() {
+    fn people_are_predicted_in_frames_in_which_the_network_does_not_search_them() {
         let case = case("predicted", "walking", 30);
         run(&case, &["--set", "network.looks=0.6"]);
         let (error, share) = judged(&case, &Isometry3::identity());
@@ -167,7 +167,7 @@ mod long {
     /// Simulates a slow machine: frames are far apart, and few of them are searched.
     #[test]
     #[ignore = "takes long"]
-    fn who_runs_is_followed_over_half_a_second_without_a_search() {
+    fn a_runner_is_followed_for_half_a_second_without_a_search() {
         let case = case("apart", "jogging", 2);
         run(&case, &["--set", "network.find_every=1000"]);
         let (error, share) = judged(&case, &Isometry3::identity());

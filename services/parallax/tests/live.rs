@@ -106,7 +106,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
 }
 
 #[test]
-fn whoever_looks_at_a_run_that_begins_sees_all_its_processes() {
+fn status_of_a_starting_run_lists_all_its_processes() {
     for _ in 0..3 {
         let case = Case::new("begins", &[600; 2], PACED);
         let mut started = case.start(&["run", "deployment.toml"]);

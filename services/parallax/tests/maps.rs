@@ -237,7 +237,7 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
 }
 
 #[test]
-fn a_view_that_names_the_sides_the_other_way_round_is_turned() {
+fn a_view_with_swapped_left_and_right_is_corrected() {
     let right = Some(as_it_is as Named);
     let case = case("sides", [right, right, Some(exchanged), right]);
     let ended = run(&case, &[]);
@@ -246,7 +246,7 @@ fn a_view_that_names_the_sides_the_other_way_round_is_turned() {
 }
 
 #[test]
-fn two_cameras_that_were_exchanged_do_not_go_unnoticed() {
+fn two_swapped_cameras_are_detected() {
     let case = case("swapped", [Some(as_it_is as Named); 4]);
     case.edit("deployment.toml", "source = \"c0\"", "source = \"cX\"");
     case.edit("deployment.toml", "source = \"c1\"", "source = \"c0\"");
@@ -261,7 +261,7 @@ fn two_cameras_that_were_exchanged_do_not_go_unnoticed() {
 }
 
 #[test]
-fn a_joint_that_only_one_view_shows_is_missing_and_the_others_are_not() {
+fn only_the_joint_that_a_single_view_shows_is_missing() {
     let hidden = Some(without_a_wrist as Named);
     let case = case("wrist", [Some(as_it_is), hidden, hidden, hidden]);
     let ended = run(&case, &[]);
@@ -282,7 +282,7 @@ fn a_joint_that_only_one_view_shows_is_missing_and_the_others_are_not() {
 }
 
 #[test]
-fn a_view_that_sees_nobody_is_accounted_for() {
+fn a_view_without_people_is_listed_with_a_reason() {
     let right = Some(as_it_is as Named);
     let case = case("nobody", [right, None, right, right]);
     let ended = run(&case, &["--json"]);
@@ -295,7 +295,7 @@ fn a_view_that_sees_nobody_is_accounted_for() {
 }
 
 #[test]
-fn a_network_whose_output_is_no_number_is_refused_before_anything_starts() {
+fn a_network_with_non_numeric_output_is_refused_before_the_start() {
     let case = case("nan", [Some(as_it_is as Named); 4]);
     case.write("net.onnx", network(f32::NAN).file());
     let ended = run(&case, &[]);
@@ -305,7 +305,7 @@ fn a_network_whose_output_is_no_number_is_refused_before_anything_starts() {
 }
 
 #[test]
-fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
+fn a_run_whose_detector_finds_nobody_has_no_result_and_reports_it() {
     let case = case("blind", [Some(as_it_is as Named); 4]);
     case.write("det.onnx", detector_of(BOX, 0.01).file());
     let ended = run(&case, &[]);
@@ -319,7 +319,7 @@ fn a_detector_that_finds_nobody_leaves_no_result_and_says_so() {
 }
 
 #[test]
-fn what_belongs_to_the_papers_method_is_refused_beside_a_network() {
+fn settings_of_the_paper_method_are_refused_together_with_a_network() {
     let case = case("beside", [Some(as_it_is as Named); 4]);
     for (set, words) in [
         ("paper.errors=shipped", "set `method = \"paper\"`"),
@@ -405,7 +405,7 @@ fn with_skewed_keypoints(
 }
 
 #[test]
-fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_of_one_frame() {
+fn keypoint_files_replace_videos_and_a_damaged_file_loses_one_view_of_one_frame() {
     let case = case("json", [Some(as_it_is as Named); 4]);
     with_keypoints(&case, "lsp-14", |_| LSP_14.map(str::to_owned).to_vec());
     let ended = run(&case, &[]);
@@ -422,7 +422,7 @@ fn keypoints_of_another_program_need_no_video_and_a_damaged_file_costs_one_view_
 }
 
 #[test]
-fn what_keypoints_have_beside_the_joints_is_written_by_name() {
+fn extra_keypoints_of_other_programs_are_written_by_name() {
     let case = case("extra", [Some(as_it_is as Named); 4]);
     // The third view swaps the left and the right leg.
     let named = |view: usize, name: &str| {
@@ -472,7 +472,7 @@ fn errors_mm(case: &Case) -> [f64; 2] {
 }
 
 #[test]
-fn pictures_of_other_moments_are_moved_to_the_instants_of_their_frames() {
+fn joints_from_pictures_with_a_skew_are_moved_to_the_instants_of_their_frames() {
     let case = case("skews", [Some(as_it_is as Named); 4]);
     let names = |_: usize| HALPE_26.map(str::to_owned).to_vec();
     let mut errors = Vec::new();

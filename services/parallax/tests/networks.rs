@@ -97,7 +97,7 @@ fn a_network_is_explained_by_its_card() {
 }
 
 #[test]
-fn a_network_without_a_card_gets_the_nearest_ones_named() {
+fn the_error_for_a_missing_card_names_the_nearest_cards() {
     let case = case("network-bare");
     let mut net = network("Relu");
     net.inputs[0].1 = [1, 3, 256, 192].map(Side::Fixed).to_vec();
@@ -131,7 +131,7 @@ fn a_network_without_a_card_gets_the_nearest_ones_named() {
 }
 
 #[test]
-fn what_does_not_fit_is_named_with_the_numbers() {
+fn a_network_that_does_not_match_its_card_is_refused_with_the_numbers() {
     let case = case("network-misfit");
     for (from, to, words) in [
         ("width = 48", "width = 96", &["[1, 3, 64, 48]", "96"][..]),
@@ -174,7 +174,7 @@ fn what_does_not_fit_is_named_with_the_numbers() {
 }
 
 #[test]
-fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
+fn keypoints_in_a_box_are_found_in_the_right_place_and_drawn() {
     let case = case("network-detect");
     let plain = ["blocks.png", "--network", "net.onnx", "--card", "card.toml"];
     let boxed = [
@@ -217,7 +217,7 @@ fn keypoints_of_a_box_are_found_where_they_are_and_drawn() {
 }
 
 #[test]
-fn options_of_the_filters_are_refused_beside_a_network() {
+fn options_of_the_filters_are_refused_together_with_a_network() {
     let case = case("network-search");
     let detect = ["detect", "a/0000.png", "--network", "net.onnx"];
     for option in [
@@ -237,7 +237,7 @@ fn options_of_the_filters_are_refused_beside_a_network() {
 
 /// The main use of the shipped network: only a picture is given.
 #[test]
-fn with_the_network_that_ships_everybody_is_found_once_and_where_they_are() {
+fn the_included_network_finds_everybody_once_and_in_the_right_place() {
     let case = Case::new("net-ships", &[1, 1], PLAIN);
     let who = ["--rig", "ring:3", "--subjects", "901", "--seed", "77"];
     let one = ["--actions", "walking", "--frames", "1"];
@@ -321,7 +321,7 @@ fn a_network_is_judged_on_marked_people() {
 }
 
 #[test]
-fn judging_ends_early_when_it_is_interrupted() {
+fn an_interrupted_judge_command_ends_early() {
     let case = case("network-interrupted");
     // The first person has no marks and is left out. The message about this shows that judging has begun, which takes minutes.
     let mut marks = vec![[f64::NAN; 2]; 14];
@@ -351,7 +351,7 @@ fn judging_ends_early_when_it_is_interrupted() {
 }
 
 #[test]
-fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
+fn a_truncated_network_and_one_without_numeric_output_are_refused() {
     let case = case("network-broken");
     let bytes = network("Relu").file();
     case.write("short.onnx", &bytes[..bytes.len() / 2]);
@@ -378,7 +378,7 @@ fn a_network_that_is_cut_short_or_gives_no_numbers_is_refused() {
 }
 
 #[test]
-fn what_is_about_a_network_is_refused_where_the_filters_find_the_parts_and_the_other_way_round() {
+fn network_options_are_refused_with_filters_and_filter_options_with_a_network() {
     let case = case("network-or-filters");
     let bring = ["--network", "net.onnx", "--card", "card.toml"];
     for (more, words) in [

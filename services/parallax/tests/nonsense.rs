@@ -278,7 +278,7 @@ fn different_frame_rates_are_refused_with_both_numbers() {
 }
 
 #[test]
-fn a_dry_run_fails_where_the_run_would_not_begin() {
+fn a_dry_run_fails_if_the_run_could_not_start() {
     let case = Case::new("huge", &[2; 16], PLAIN);
     // These frames need more memory than usual machines have: a frame has 0.8 GB, and is stored seven times.
     case.edit(

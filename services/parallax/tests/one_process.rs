@@ -71,7 +71,7 @@ fn pictures(named: [Named; 4]) -> [Vec<Canvas>; 4] {
 }
 
 #[test]
-fn many_processes_give_the_bits_of_one() {
+fn many_processes_give_the_same_bits_as_one() {
     let named: [Named; 4] = [as_it_is, exchanged, as_it_is, without_a_wrist];
     let case = case("one-process", named.map(Some));
     run_as_they_are(&case);
@@ -79,7 +79,7 @@ fn many_processes_give_the_bits_of_one() {
 }
 
 #[test]
-fn many_processes_give_the_bits_of_one_where_people_are_predicted() {
+fn many_processes_give_the_same_bits_as_one_with_predicted_people() {
     let case = case("one-predicted", [Some(as_it_is); 4]);
     case.set_network("file = \"net.onnx\"\ndetector = \"det.onnx\"\nlooks = 0.6");
     let file = case.path("deployment.toml");
@@ -97,7 +97,7 @@ fn many_processes_give_the_bits_of_one_where_people_are_predicted() {
 }
 
 #[test]
-fn many_processes_give_the_bits_of_one_from_keypoints_of_another_program() {
+fn many_processes_give_the_same_bits_as_one_with_keypoint_files() {
     let case = case("one-by-keypoints", [Some(as_it_is); 4]);
     with_keypoints(&case, "halpe-26", |_| HALPE_26.map(str::to_owned).to_vec());
     run_as_they_are(&case);

@@ -20,7 +20,7 @@ fn unchanged_frames() {
 }
 
 #[test]
-fn turned_resized_and_distorted_frames() {
+fn rotated_resized_and_distorted_frames() {
     let rig = planted::tilted_rig(3);
     let more = "[capture]\nsize = [120, 140]\n[results]\noverlay_every = 0\n";
     let case = Case::with_rig(&rig, "warped", &[20; 3], more);

@@ -106,7 +106,7 @@ fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
 }
 
 #[test]
-fn a_view_that_ends_early_is_missing_from_then_on() {
+fn a_view_whose_footage_ends_early_is_missing_afterwards() {
     let case = Case::new("short", &[12, 12, 7], PLAIN);
     let ended = case.run();
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
@@ -134,7 +134,7 @@ fn a_view_that_ends_early_is_missing_from_then_on() {
 }
 
 #[test]
-fn a_killed_results_process_stops_no_other_and_counts_missed_frames() {
+fn a_killed_results_process_does_not_stop_others_and_counts_missed_frames() {
     let case = Case::new("kill-results", &[100; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("ten frames", |_| case.lines("pose3d.jsonl").len() >= 10);

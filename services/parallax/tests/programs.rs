@@ -48,7 +48,7 @@ fn mapped_file(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending() {
+fn a_client_receives_from_a_restarted_process_and_does_not_keep_a_run_from_ending() {
     let live = PACED.replace("\"paced\"", "\"realtime\"");
     let case = Case::new("client", &[160; 2], &live);
     let wish = Wish::skeletons().with_poses().with_pictures().every_frame(64);
@@ -94,7 +94,7 @@ fn a_client_hears_a_process_again_that_was_killed_and_keeps_no_run_from_ending()
 }
 
 #[test]
-fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
+fn a_sleeping_client_does_not_affect_a_lossless_run() {
     // The run is longer than a client may need to join on a loaded machine.
     let case = Case::new("asleep", &[160; 2], PACED);
     // This client holds a picture of each view, and never reads another picture.
@@ -133,7 +133,7 @@ fn a_client_that_sleeps_loses_nothing_of_a_lossless_run() {
 }
 
 #[test]
-fn as_many_clients_as_there_are_places_and_no_more() {
+fn the_number_of_clients_is_limited_to_the_number_of_places() {
     let case = Case::new("full", &[400; 2], PACED);
     let wish = Wish::skeletons();
     let mut clients = vec![Client::wait_for(&case.name, &wish).unwrap()];
@@ -157,7 +157,7 @@ fn as_many_clients_as_there_are_places_and_no_more() {
 }
 
 #[test]
-fn a_client_across_short_runs_is_told_of_no_error() {
+fn a_client_gets_no_error_from_a_series_of_short_runs() {
     let case = Case::new("across", &[4; 2], PLAIN);
     let wish = Wish::skeletons().with_poses().every_frame(64);
     let mut client = Client::wait_for(&case.name, &wish).unwrap();
@@ -183,7 +183,7 @@ fn a_client_across_short_runs_is_told_of_no_error() {
 }
 
 #[test]
-fn datagrams_say_where_joints_are_and_the_run_is_as_without() {
+fn datagrams_contain_the_joints_and_sending_them_does_not_change_the_run() {
     let case = Case::new("publish", &[120; 2], PACED);
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     socket.set_read_timeout(Some(WATCHDOG)).unwrap();

@@ -79,7 +79,7 @@ fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
 }
 
 #[test]
-fn footage_without_a_frame_rate_ends_at_once_and_dropped_frames_are_counted() {
+fn footage_without_a_frame_rate_is_read_at_once_and_dropped_frames_are_counted() {
     let case = Case::new("unpaced", &[60; 2], LIVE);
     let ended = case.run();
     let run = Finished::new(&case, &ended);

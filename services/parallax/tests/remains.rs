@@ -71,7 +71,7 @@ fn an_unknown_deployment_name_is_refused() {
 }
 
 #[test]
-fn foreign_files_are_named_and_kept_and_no_link_is_followed() {
+fn foreign_files_are_named_and_kept_and_links_are_not_followed() {
     let case = Case::new("stays", &[2; 2], "");
     // First, the foreign folder is beside the deployments. Then a link replaces the directory of the deployments.
     let script = "mount -t tmpfs tmpfs /dev/shm\n\

@@ -24,7 +24,7 @@ fn assert_no_bus_error(ended: &Ended) {
 }
 
 #[test]
-fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal() {
+fn shared_memory_that_fills_at_the_start_of_a_run_causes_an_error_instead_of_a_signal() {
     let more = PLAIN.to_owned() + "[supervise]\nmax_restarts = 2\ndeadline_ms = 2000\n";
     let case = Case::new("filling", &[20; 3], &more);
     // A second process fills the rest of the shared memory as soon as the supervisor has its lock, and frees it before the next run. This
@@ -68,7 +68,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_is_an_error_and_not_a_signal()
 }
 
 #[test]
-fn a_file_that_cannot_grow_is_counted_and_ends_no_process() {
+fn a_file_that_cannot_grow_is_counted_and_does_not_end_a_process() {
     let case = Case::new("limit", &[60; 2], PACED);
     let mut started = case.start(&["run", "deployment.toml", "--json"]);
     started.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
@@ -101,7 +101,7 @@ fn a_file_size_limit_is_an_error_with_the_limit() {
 }
 
 #[test]
-fn files_of_a_run_are_accessible_to_their_owner_only_with_any_umask() {
+fn files_of_a_run_are_private_for_any_umask() {
     let case = Case::new(
         "umask",
         &[3; 2],
@@ -187,7 +187,7 @@ fn too_few_descriptors_are_refused_with_the_numbers() {
 }
 
 #[test]
-fn a_second_run_of_the_same_name_is_refused_and_the_first_goes_on() {
+fn a_second_run_of_the_same_name_is_refused_and_the_first_continues() {
     let case = Case::new("twice", &[60; 2], PACED);
     let mut first = case.start(&["run", "deployment.toml", "--json"]);
     first.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
@@ -268,7 +268,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn shared_memory_that_fills_during_a_run_affects_starting_processes_only() {
+    fn shared_memory_that_fills_during_a_run_affects_only_starting_processes() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("filled", &[300; 3], &more);
         // The processes are children of the run. One of these processes is killed when there is no space to start another. The space that it

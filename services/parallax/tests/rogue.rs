@@ -223,7 +223,7 @@ fn assert_all(refused: &BTreeSet<String>, processes: &[&str], causes: &[&str]) {
 }
 
 #[test]
-fn a_foreign_process_cannot_publish_another_type_or_beside_the_right_sender() {
+fn a_foreign_process_cannot_publish_another_type_or_compete_with_the_right_sender() {
     let (case, started, rogue) = start("types", PACED);
     let wrong_type = rogue.bus.publisher::<PairPose>(&topic::view_pose(0));
     assert!(matches!(wrong_type, Err(PortError::WrongType { .. })));

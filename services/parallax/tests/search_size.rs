@@ -65,7 +65,7 @@ fn said(case: &Case) -> String {
 }
 
 #[test]
-fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
+fn by_default_the_size_follows_from_the_calibration_in_any_unit() {
     let case = Case::new("size-dry", &[1; 2], PLAIN);
     deployment(&case, &[[1088, 1920]; 4], 1800.0, 1.0);
     let text = said(&case);
@@ -91,7 +91,7 @@ fn with_nothing_set_the_size_follows_from_the_calibration_in_any_unit() {
 }
 
 #[test]
-fn cameras_of_different_sizes_are_told_apart_and_small_people_are_warned_of() {
+fn cameras_of_different_sizes_are_distinguished_and_small_people_give_a_warning() {
     let case = Case::new("size-mixed", &[1; 2], PLAIN);
     deployment(&case, &[[1920, 1080], [640, 480], [1920, 1080]], 700.0, 1.0);
     let text = said(&case);
@@ -148,7 +148,7 @@ fn side(parts: &Value) -> f64 {
 }
 
 #[test]
-fn a_run_says_that_people_are_too_small_and_what_to_set() {
+fn a_run_warns_about_small_people_and_names_the_setting_to_change() {
     // The pictures have 96x128 pixels.
     let case = Case::new("size-small", &[3; 2], PLAIN);
     let (json, text) = run(&case, &[]);

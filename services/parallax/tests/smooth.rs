@@ -98,7 +98,7 @@ fn assert_angles(case: &Case) {
 }
 
 #[test]
-fn a_run_is_smoothed_live_and_better_afterwards() {
+fn a_run_is_smoothed_live_and_more_accurately_afterwards() {
     let case = case();
     assert_eq!(case.run().status.code(), Some(0));
     let live = lines(&case, "out/pose3d-smooth.jsonl");
@@ -235,7 +235,7 @@ fn each_of_several_people_is_smoothed_alone() {
 }
 
 #[test]
-fn whoever_was_followed_one_after_the_other_is_smoothed_as_one() {
+fn people_followed_one_after_the_other_are_smoothed_as_one_track() {
     let case = Case::new("smooth-one-after", &[0], "");
     fs::create_dir(case.path("run")).unwrap();
     let lines_of_one = (0..50).map(|frame| {
@@ -280,7 +280,7 @@ fn text(lines: impl IntoIterator<Item = FrameLine>) -> String {
 }
 
 #[test]
-fn what_a_folder_lacks_is_said_and_by_exit_code() {
+fn smoothing_reports_missing_files_of_a_folder_by_message_and_exit_code() {
     let case = Case::new("smooth-attack", &[0], "");
     fs::create_dir(case.path("run")).unwrap();
     let at = |frame: u64| Some(frame as f64 / 60.0);

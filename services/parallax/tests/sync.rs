@@ -76,7 +76,7 @@ fn estimate(case: &Case, more: &[&str]) -> Ended {
 }
 
 #[test]
-fn clocks_are_found_written_and_used() {
+fn clock_offsets_are_estimated_written_and_used() {
     let scene = scene();
     let rig = scene.rig();
     let case = case(&scene, rig, N_FRAMES, |view, frame| {
@@ -123,7 +123,7 @@ fn clocks_are_found_written_and_used() {
 }
 
 #[test]
-fn what_tells_nothing_is_refused_and_nothing_is_written() {
+fn footage_without_movement_is_refused_and_nothing_is_written() {
     let scene = scene();
     let rig = scene.rig();
     let still = case(&scene, rig, N_FRAMES, |_, _| 0.5);
@@ -177,7 +177,7 @@ fn video(case: &Case, name: &str, sounds_s: &[f64], length_s: f64) -> bool {
 }
 
 #[test]
-fn clocks_are_found_by_the_sounds_of_the_videos() {
+fn clock_offsets_are_estimated_from_the_sound_of_the_videos() {
     let scene = scene();
     let rig = scene.rig();
     let case = case(&scene, rig, N_FRAMES, |_, _| 0.5);

@@ -39,7 +39,7 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
 }
 
 #[test]
-fn cameras_that_do_not_begin_with_the_same_number_are_told() {
+fn cameras_that_start_with_different_numbers_are_reported() {
     let case = Case::new("late", &[6; 2], PLAIN);
     fs::remove_file(case.path("b/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();

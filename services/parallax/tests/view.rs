@@ -114,7 +114,7 @@ impl Page {
 }
 
 #[test]
-fn a_page_follows_a_run_from_before_its_begin_until_after_its_end() {
+fn a_page_follows_a_run_from_before_its_start_until_after_its_end() {
     let case = Case::new("view", &[160; 2], PACED);
     let view = View::start(&case, &["deployment.toml"]);
     let mut page = view.open();
@@ -199,7 +199,7 @@ fn finished(case: &Case) {
 }
 
 #[test]
-fn other_sites_strange_requests_and_nonsense_are_refused_and_the_page_goes_on() {
+fn requests_from_other_sites_and_invalid_requests_are_refused_and_the_page_continues() {
     let case = Case::new("view-refuses", &[1; 2], "");
     let view = View::start(&case, &["--deployment", &case.name]);
     let here = view.address.clone();

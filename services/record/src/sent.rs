@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_that_were_not_received_count_as_lost_once() {
+    fn each_message_that_was_not_received_counts_as_lost_once() {
         let mut sent = Sent::default();
         for _ in 0..7 {
             sent.received();
@@ -54,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn epochs_add_up_and_an_old_heartbeat_changes_nothing() {
+    fn counts_of_epochs_are_summed_and_an_old_heartbeat_has_no_effect() {
         let mut sent = Sent::default();
         sent.reported(0, 5);
         sent.reported(1, 3);

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_process_of_this_host_publishes_is_not_recorded_nor_counted_by_one() {
+    fn topics_of_other_hosts_are_neither_recorded_nor_counted() {
         let topics = Topics {
             n_views: 2,
             fused: Vec::new(),
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn heartbeats_count_the_topics_of_their_process_and_poses_their_evidence() {
+    fn heartbeats_count_the_messages_of_their_process_and_poses_count_their_evidence() {
         let all = channels(Without::default());
         let counted = |name: &str| {
             let counter = all.iter().find(|channel| channel.name == name).unwrap();

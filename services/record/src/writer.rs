@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_epoch_has_a_file_of_its_own() {
+    fn every_epoch_has_its_own_file() {
         let file = Path::new("out/run.mcap");
         assert_eq!(file_of_life(file, 0), file);
         assert_eq!(file_of_life(file, 2), Path::new("out/run.2.mcap"));

@@ -203,7 +203,7 @@ mod tests {
     use crate::testing::{record, scene};
 
     #[test]
-    fn every_camera_has_an_entry_and_of_two_nobody_is_suspected() {
+    fn every_camera_has_an_entry_and_with_two_cameras_none_is_suspected() {
         let scene = scene();
         let mut it = Calibration::new(&scene);
         for frame in 0..100 {
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_fusion_over_maps_left_out_is_looked_at_all_the_same() {
+    fn a_view_that_fusion_left_out_is_still_checked() {
         let scene = scene();
         let mut record = record(0);
         record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_found_nobody_says_nothing_of_the_cameras() {
+    fn a_view_without_people_is_not_used_for_the_check() {
         let scene = scene();
         let mut record = record(0);
         assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);

@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rerun_replaces_what_is_there() {
+    fn a_rerun_replaces_earlier_files() {
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), false, "one", true);
         write(dir.path(), false, "two", true);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_no_run_has_made_stays() {
+    fn a_folder_that_is_not_from_a_run_is_kept() {
         let dir = tempfile::tempdir().unwrap();
         let pictures = dir.path().join("pictures");
         fs::create_dir_all(pictures.join("left")).unwrap();
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_result_stays_until_the_new_one_is_whole() {
+    fn an_earlier_result_is_kept_until_the_new_one_is_complete() {
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), false, "one", true);
         write(dir.path(), false, "two", false);
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_killed_writer_goes_on_where_it_stopped() {
+    fn a_restarted_writer_continues_where_it_was_killed() {
         let dir = tempfile::tempdir().unwrap();
         write(dir.path(), false, "one", false);
         let half = "one\nhalf a li";
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn room_that_was_taken_is_filled_and_the_rest_given_back() {
+    fn reserved_space_is_filled_and_the_rest_is_released() {
         let dir = tempfile::tempdir().unwrap();
         let mut folder = Folder::open(dir.path(), false).unwrap();
         folder.reserve("summary.json", 100).unwrap();
@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_left_keeps_the_name_of_a_part() {
+    fn an_unfinished_file_keeps_the_extension_part() {
         let dir = tempfile::tempdir().unwrap();
         let mut folder = Folder::open(dir.path(), false).unwrap();
         folder.file("a.txt").unwrap();

@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_has_the_messages_about_its_frame() {
+    fn a_result_is_combined_with_the_messages_about_its_frame() {
         let mut gather = Gather::new(2, 0, 1, false);
         gather.pose(0, &pose(3));
         gather.pose(1, &pose(4));
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn expected_errors_that_fusion_used_are_awaited_and_no_others() {
+    fn only_expected_errors_that_fusion_used_are_awaited() {
         let mut gather = Gather::new(2, 0, 1, false);
         let stamp = pose(3).stamp;
         let pair = |sigma_age: [u16; 2]| {
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_without_a_result_has_a_reason_and_none_is_settled_twice() {
+    fn every_frame_without_a_result_has_a_reason_and_is_reported_once() {
         let mut gather = Gather::new(2, 0, 2, false);
         for frame in [0, 4, 8] {
             gather.pose(0, &pose(frame));

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_height_is_the_longer_side_around_the_parts_of_poses_that_were_used() {
+    fn the_height_is_the_longer_side_of_the_box_around_the_parts_used() {
         let scene = scene();
         let mut heights = Heights::new(2);
         for px in [90.0, 400.0, 120.0] {
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn it_has_warned_once_that_people_are_too_small() {
+    fn enough_poses_outside_the_good_heights_give_a_warning() {
         let scene = scene();
         let warns = |px: f64, n: u64| {
             let mut heights = Heights::new(2);

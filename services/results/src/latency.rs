@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn computation_and_transport_make_up_the_whole() {
+    fn computation_and_transport_add_up_to_the_total_latency() {
         let mut latency = Latency::new(1).unwrap();
         latency.add(&timed(0, 0));
         let got = latency.report();
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn time_behind_a_busy_process_is_waiting_not_transport() {
+    fn time_spent_behind_a_busy_process_counts_as_waiting() {
         let mut latency = Latency::new(1).unwrap();
         latency.add(&timed(0, 0));
         // The pose process is busy until 52. Frame 1 was sent at 30 and received at 54.

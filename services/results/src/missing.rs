@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_of_a_killed_capture_are_lost_though_the_pose_of_its_last_one_comes_later() {
+    fn frames_of_a_killed_capture_process_are_lost_even_if_a_pose_arrives_later() {
         let mut history = history();
         history.note_frame(&captured(2, 0));
         history.note_ports([Vec::new(), vec![1]]);

@@ -175,13 +175,13 @@ mod tests {
     }
 
     #[test]
-    fn something_is_drawn() {
+    fn an_overlay_is_not_empty() {
         let canvas = draw(&scene(), &with_picture(), 0, 0).unwrap();
         assert!(canvas.rgb().iter().any(|value| *value > 0));
     }
 
     #[test]
-    fn extra_keypoints_are_drawn_where_the_view_sees_them() {
+    fn extra_keypoints_are_drawn_at_their_pixels() {
         let mut scene = scene();
         let mut record = with_picture();
         let without = draw(&scene, &record, 0, 0).unwrap();
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn everybody_is_drawn() {
+    fn every_person_is_drawn() {
         let scene = scene();
         let mut record = with_picture();
         let one = draw(&scene, &record, 0, 0).unwrap();

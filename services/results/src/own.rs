@@ -90,7 +90,7 @@ mod tests {
     use crate::testing::{record, scene};
 
     #[test]
-    fn a_view_without_a_candidate_has_no_reading() {
+    fn a_view_without_a_candidate_has_no_offset() {
         let scene = scene();
         let mut record = record(0);
         assert!(readings(&scene, &record, 0).is_some());
@@ -136,7 +136,7 @@ mod tests {
     };
 
     #[test]
-    fn views_that_show_somebody_else_count_only_where_no_two_agree() {
+    fn views_of_another_person_count_only_if_no_two_views_agree() {
         let mut scene = scene();
         scene.joints = &ONE;
         scene.views.push(scene.views[1].clone());

@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn each_person_has_a_summary_of_the_own_frames() {
+    fn each_person_has_a_summary_of_their_own_frames() {
         let mut counted = Counted::new(Follow::Last);
         let mut person = SkeletonMessage {
             status: Status::OK,

@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_are_those_of_the_footage() {
+    fn positions_are_in_pixels_of_the_footage() {
         let scene = scene();
         let record = record(0);
         let candidates = record.candidates(&scene, 0);
@@ -115,14 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn types_and_levels_count_from_one() {
+    fn types_and_levels_are_counted_from_one() {
         let got = lines(&record(0));
         assert_eq!(got[0]["single"]["level"], 1);
         assert_eq!(got[0]["single"]["parts"][0]["type"], 1);
     }
 
     #[test]
-    fn a_view_that_sent_nothing_says_so() {
+    fn a_view_without_a_message_has_a_reason() {
         let mut record = record(0);
         record.views[1].pose = None;
         record.skeletons.people[0].views[1].status = Status::NO_FRAME;

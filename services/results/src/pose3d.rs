@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_none_is_never_written_as_one() {
+    fn values_that_are_not_finite_are_never_written_as_numbers() {
         let mut record = record(0);
         let pose = &mut record.skeletons.people[0];
         pose.facing_margin = f64::INFINITY;
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_beyond_the_joint_set_is_cut() {
+    fn a_joint_count_beyond_the_joint_set_is_limited() {
         let mut person = skeletons(0).people[0];
         person.n_joints = u32::MAX;
         assert_eq!(joints(&scene(), &person).count(), 14);

@@ -98,12 +98,12 @@ mod tests {
     }
 
     #[test]
-    fn z_up_becomes_y_up_by_exchanging_axes() {
+    fn z_up_is_converted_to_y_up_by_a_swap_of_axes() {
         assert_eq!(opensim([0.0, 0.0, 1.0], [1.0, 2.0, 3.0]), [2.0, 3.0, 1.0]);
     }
 
     #[test]
-    fn any_up_becomes_y() {
+    fn any_up_direction_is_converted_to_y_up() {
         for up in [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [0.6, 0.0, 0.8]] {
             let got = opensim(up, up);
             let off = (got[0].powi(2) + (got[1] - 1.0).powi(2) + got[2].powi(2)).sqrt();

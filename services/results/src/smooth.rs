@@ -175,7 +175,7 @@ mod tests {
     use crate::testing::scene;
 
     #[test]
-    fn the_smoothers_of_those_who_cannot_come_back_go_and_their_counts_stay() {
+    fn smoothers_of_people_who_left_are_removed_and_their_counts_are_kept() {
         let file = tempfile::tempfile().unwrap();
         let mut smoothing = Smoothing::begin(&scene(), file).unwrap();
         for (frame, time_s, id) in [(0, 0.0, 1), (1, 30.0, 2), (2, 60.0, 2), (3, 62.0, 3)] {

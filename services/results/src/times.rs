@@ -48,7 +48,7 @@ mod tests {
     use crate::testing::{record, scene};
 
     #[test]
-    fn times_count_from_the_beginning_of_the_run_and_lives_are_told_apart() {
+    fn times_are_counted_from_the_start_of_the_run_and_epochs_are_distinguished() {
         let mut record = record(7);
         record.skeletons.stamp.session = 1_000_000_000;
         record.skeletons.timing.sent_at_nanos = 1_040_500_000;
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_could_not_be_read_was_not_taken() {
+    fn an_unreadable_frame_has_no_capture_time() {
         let mut record = record(0);
         record.views[0].frame = Some(FrameHeader {
             status: Status::NO_FRAME,

@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_reads_back() {
+    fn written_files_read_back() {
         let mut moved = skeletons(1);
         moved.people[0].joints[0].in_world = [-0.25, 0.5, 1.75];
         let got = written(vec![skeletons(0), moved]);

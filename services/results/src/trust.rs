@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_of_what_was_found() {
+    fn fractions_are_relative_to_the_joints_that_were_found() {
         let mut trusted = Trusted::default();
         let mut add = |pose: &SkeletonMessage| trusted.add(Some(pose), &[(0, 1)], (Some(0.0), &[]));
         add(&result(Sides::SURE));

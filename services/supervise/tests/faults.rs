@@ -59,7 +59,7 @@ fn state_of(run: &Run, process: &str) -> State {
 }
 
 #[test]
-fn a_process_is_stopped_once_all_that_send_to_it_are_given_up() {
+fn a_process_is_stopped_after_all_its_senders_are_abandoned() {
     let mut case = Case::new(
         Delivery::Lossless,
         &[
@@ -103,7 +103,7 @@ fn a_sender_that_waits_for_a_killed_receiver_continues() {
 }
 
 #[test]
-fn an_incomplete_message_of_a_killed_sender_is_never_received_and_its_restart_continues() {
+fn an_incomplete_message_of_a_killed_sender_is_not_received_and_the_restarted_sender_continues() {
     let case = Case::new(
         Delivery::Lossless,
         &[
@@ -141,7 +141,7 @@ fn a_killed_sender_is_restarted_and_the_others_continue() {
 }
 
 #[test]
-fn a_process_that_ends_by_a_foreign_signal_has_failed() {
+fn a_process_that_ends_by_a_signal_of_another_program_has_failed() {
     for (signal, number) in [("-TERM", 15), ("-INT", 2), ("-HUP", 1)] {
         let case = Case::new(
             Delivery::Realtime,
@@ -257,7 +257,7 @@ fn computing_long_is_allowed_without_a_limit() {
 }
 
 #[test]
-fn a_process_that_never_waits_is_not_taken_for_hanging() {
+fn a_process_that_never_waits_is_not_reported_as_hanging() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[("mill", "compute 20 0", Role::Essential)],
@@ -314,7 +314,7 @@ fn a_process_that_has_worked_for_a_while_is_restarted_at_once() {
 }
 
 #[test]
-fn a_crash_loop_is_given_up_after_increasing_pauses() {
+fn a_crashing_process_is_abandoned_after_increasing_pauses() {
     let mut case = Case::new(Delivery::Realtime, &[("wreck", "panic", Role::Essential)]);
     case.plan.policy.max_restarts = 3;
     let run = case.run(|_, _| {});
@@ -370,7 +370,7 @@ fn a_run_continues_with_the_remaining_views() {
 }
 
 #[test]
-fn a_process_that_waits_for_a_given_up_view_does_not_block_the_end() {
+fn a_process_that_waits_for_an_abandoned_view_does_not_block_the_end() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[
@@ -436,7 +436,7 @@ fn a_process_that_never_starts_its_main_loop_is_killed() {
 }
 
 #[test]
-fn children_end_with_a_killed_supervisor_and_the_next_one_cleans_up() {
+fn processes_end_with_a_killed_supervisor_and_the_next_run_cleans_up() {
     let case = Case::new(Delivery::Realtime, &[("only", "idle", Role::Essential)]);
     let mut supervisor = Command::new(&case.plan.executable)
         .arg("supervise")

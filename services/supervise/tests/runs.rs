@@ -11,7 +11,7 @@ use runtime::Delivery;
 use supervise::{Role, State, SuperviseError};
 
 #[test]
-fn a_lossless_run_loses_nothing_and_ends_by_itself() {
+fn a_lossless_run_loses_no_frame_and_ends_by_itself() {
     let case = Case::new(
         Delivery::Lossless,
         &[

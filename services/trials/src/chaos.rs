@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_impossible_scenario_is_refused_if_requested_and_else_left_out() {
+    fn an_impossible_scenario_is_refused_if_requested_and_otherwise_left_out() {
         let processes = ["capture-0", "pose-0", "triangulate", "results"].map(str::to_owned);
         let all = chosen(&[], &processes).unwrap();
         assert_eq!(all.len(), 20);

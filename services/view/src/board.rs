@@ -260,7 +260,7 @@ mod tests {
     const NONE: [bool; MAX_VIEWS] = [false; MAX_VIEWS];
 
     #[test]
-    fn a_page_that_is_slow_gets_the_newest_and_never_what_came_before() {
+    fn a_slow_page_gets_the_newest_frame_and_never_an_older_one() {
         let board = Board::new();
         for n in 0..100 {
             board.moment(n.to_string());
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_go_to_pages_that_show_them() {
+    fn pictures_are_sent_only_to_pages_that_show_them() {
         let board = Board::new();
         board.picture(2, vec![7]);
         board.picture(MAX_VIEWS, vec![8]);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn another_run_clears_what_was_shown_of_the_last_one() {
+    fn a_new_run_clears_the_page() {
         let board = Board::new();
         board.moment("old".to_owned());
         board.begin(&json!({ "type": "hello" }), None);
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_that_opens_later_learns_what_has_happened_before_up_to_a_limit() {
+    fn a_page_that_opens_later_gets_a_limited_number_of_earlier_events() {
         let board = Board::new();
         for n in 0..2 * MOST_EVENTS {
             board.event(Weight::Error, &format!("event {n}"));

@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_user_of_the_other_end_is_read_from_the_table_of_the_kernel() {
+    fn the_user_of_a_connection_is_read_from_the_kernel_table() {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let peer = Peer::new(&listener.accept().unwrap().0).unwrap();
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_of_another_user_is_told_apart() {
+    fn a_connection_of_another_user_is_detected() {
         let table = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n   \
             0: 0100007F:1EC6 0100007F:C350 01 00000000:00000000 00:00000000 00000000  1000        0 1\n   \
             1: 0100007F:C350 0100007F:1EC6 01 00000000:00000000 00:00000000 00000000  4001        0 2\n";
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_places_are_taken_than_there_are() {
+    fn the_number_of_connections_is_limited() {
         let taken = Arc::default();
         let seats: Vec<_> = (0..3).map(|_| Seat::take(&taken, 2)).collect();
         assert_eq!(seats.iter().flatten().count(), 2);

@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_time_line_is_told_in_few_pieces() {
+    fn a_long_timeline_is_sent_in_few_pieces() {
         let frame = |number: u64| Frame {
             number,
             has_pose: Some(number < 600),

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_is_read_and_what_follows_is_kept() {
+    fn a_request_is_parsed_and_following_bytes_are_kept() {
         let text = "GET /view.js?x HTTP/1.1\r\nHost: here\r\n\r\nmore";
         let asked = read(&mut text.as_bytes()).unwrap().unwrap();
         assert_eq!(asked.request.uri().path(), "/view.js");
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_request_is_refused() {
+    fn invalid_requests_are_refused() {
         assert_eq!(status("nonsense\r\n\r\n"), 400);
         assert_eq!(status("POST / HTTP/1.1\r\nHost: here\r\n\r\n"), 400);
         assert_eq!(status("GET / HTTP/1.1\r\nHost: here\r\n"), 0);
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_has_its_length_and_its_headers() {
+    fn an_answer_has_its_length_and_headers() {
         let mut written = Vec::new();
         let answer = Answer::text(404, "none");
         answer.write(&mut written, &[("X", "y")]).unwrap();
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_connection_whose_time_is_over_is_not_waited_for() {
+    fn a_connection_is_closed_after_its_timeout() {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let _other = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let stream = listener.accept().unwrap().0;

@@ -212,7 +212,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn of_several_people_the_one_who_is_followed_is_shown_first() {
+    fn the_followed_person_is_shown_first() {
         let mut message = Box::<Skeletons>::default();
         (message.n_people, message.n_seen) = (2, 3);
         for (nth, person) in message.people[..2].iter_mut().enumerate() {

@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_large_picture_becomes_the_means_of_squares() {
+    fn a_large_picture_is_shrunk_to_means_of_squares() {
         // Columns alternate between 0 and 200, with a width of 1000 pixels, so blocks of three by three pixels have a mean of 67 or 133.
         let rgb: Vec<u8> = (0..1000 * 6).flat_map(|i| [200 * (i % 2) as u8, 9, 255]).collect();
         let (size, small) = reduced([1000, 6], &rgb).unwrap();
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_names_view_and_frame_before_the_file() {
+    fn a_picture_message_contains_view_and_frame_before_the_file() {
         let rgb = vec![90; 40 * 30 * 3];
         let bytes = message(3, 0x0102_0304_0506, [40, 30], &rgb, true).unwrap();
         assert_eq!(bytes[..4], [1, 3, 1, 0]);

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_in_use_is_left_to_its_owner_and_another_taken_where_that_is_allowed() {
+    fn a_port_in_use_is_an_error_or_is_replaced_by_another_if_allowed() {
         let other = TcpListener::bind("127.0.0.1:0").unwrap();
         let mut listen = Listen {
             address: other.local_addr().unwrap(),

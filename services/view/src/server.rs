@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn with_a_token_any_name_of_the_machine_will_do_and_other_sites_still_not() {
+    fn with_a_token_any_host_name_is_accepted_and_other_sites_are_refused() {
         assert!(checked(
             "desk.example:7878",
             Some("http://desk.example:7878"),
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_loads_files_that_are_served_and_finds_every_element_that_it_asks_for() {
+    fn all_files_and_elements_that_the_page_uses_exist() {
         let scripts = MODULES.map(|module| module.1);
         for text in scripts.iter().chain([&INDEX]) {
             for piece in text.split("\"./").skip(1) {

@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_drawn_for_points_that_exist_and_what_is_no_question_is_refused() {
+    fn epipolar_lines_are_drawn_for_existing_points_and_invalid_requests_are_refused() {
         let mut page = page();
         let lines = ask(&mut page, QUESTIONS[5]);
         assert_eq!(lines[0]["type"], "epipolar");
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_ends_with_its_page_and_a_page_of_another_user_begins_none() {
+    fn a_recording_ends_with_its_page_and_a_page_of_another_user_cannot_start_one() {
         let mut first = page();
         let board = Arc::clone(&first.site.board);
         ask(&mut first, r#"{"record":true}"#);
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn a_page_stands_whatever_it_is_asked_and_its_counts_end_at_nothing() {
+    fn a_page_survives_any_requests_and_leaves_no_counts_behind() {
         let mut random = fastrand::Rng::with_seed(1);
         let mut page = page();
         for _ in 0..4000 {

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn every_message_has_its_frame_and_those_between_are_left_out() {
+    fn each_message_is_assigned_to_its_frame_and_surplus_messages_are_left_out() {
         let mut it = arrivals();
         assert_eq!(it.place(GRID.at(0)), Place::Frame(0));
         it.used();
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_given_up_after_a_while_and_its_message_is_late() {
+    fn a_frame_is_skipped_after_a_timeout_and_its_later_message_counts_as_late() {
         let mut it = arrivals();
         assert_eq!(it.overdue(GRID.at(0) + 300, true), None);
         assert_eq!(it.overdue(GRID.at(0) + 301, true), Some(Gap::Late));
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_jitter_about_the_middle_keep_to_their_frames() {
+    fn capture_times_that_jitter_around_the_middle_between_two_frames_keep_their_frames() {
         let mut it = arrivals();
         for nth in 0..100 {
             let jitter = if nth % 2 == 0 { 45 } else { 55 };
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn before_and_beyond_the_run_nothing_has_a_place() {
+    fn messages_before_the_start_and_after_the_end_of_the_run_are_surplus() {
         let mut it = arrivals();
         assert_eq!(it.place(0), Place::Surplus);
         assert_eq!(it.place(GRID.at(1000)), Place::Surplus);
@@ -265,7 +265,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_frame_is_published_once_whatever_comes(
+        fn every_frame_is_published_once_for_any_sequence_of_arrivals(
             steps in prop::collection::vec((0_u64..200_000, any::<bool>(), any::<bool>()), 1..300),
         ) {
             let mut it = arrivals();

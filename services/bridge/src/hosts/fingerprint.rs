@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_difference_names_both_hashes() {
+    fn the_error_for_different_files_names_both_hashes() {
         let [mut here, mut there] = [Fingerprint::default(), Fingerprint::default()];
         for it in [&mut here, &mut there] {
             it.add("model", b"model");

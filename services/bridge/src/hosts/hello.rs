@@ -140,7 +140,7 @@ mod tests {
     };
 
     #[test]
-    fn the_same_files_are_welcome_and_others_refused_with_both_hashes() {
+    fn equal_files_are_accepted_and_different_files_are_refused_with_both_hashes() {
         let ours = hello(b"a").fingerprint;
         let read = |answer: &Answer| Answer::parse(&answer.to_bytes()).unwrap();
         let same = Hello::parse(&hello(b"a").to_bytes()).unwrap();
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_introduction_is_refused() {
+    fn bytes_that_are_not_an_introduction_are_refused() {
         let long = vec![b' '; 70_000];
         for bytes in [&b""[..], b"{}", b"[1", b"\xff\xfe", &long] {
             assert!(Hello::parse(bytes).is_err() && Answer::parse(bytes).is_err());

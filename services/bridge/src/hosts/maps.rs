@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_survive_the_way() {
+    fn maps_survive_a_round_trip() {
         for n in [0, 1, 40, MOST_GAUSSIANS] {
             assert_eq!(Maps::parse(&maps(n).to_bytes()), Ok(maps(n)));
         }
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_off_or_too_much_is_refused_with_the_number() {
+    fn truncated_maps_and_maps_with_too_many_gaussians_are_refused_with_the_number() {
         let whole = maps(2).to_bytes();
         let refused = |bytes: &[u8]| Maps::parse(bytes).unwrap_err().to_string();
         assert_eq!(whole.len(), 4 + 2 * (PERSON + EACH));
@@ -230,7 +230,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_maps_or_refused(bytes: Vec<u8>) {
+        fn any_bytes_are_parsed_as_maps_or_refused(bytes: Vec<u8>) {
             let parsed = Maps::parse(&bytes);
             if let Ok(maps) = parsed {
                 prop_assert_eq!(maps.to_bytes(), bytes);

@@ -143,7 +143,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     #[test]
-    fn the_newest_wins_and_what_it_overtook_is_counted() {
+    fn a_newer_message_replaces_the_waiting_one_and_the_replaced_one_is_counted() {
         let mut outbox = Outbox::new(1);
         for item in 0..10 {
             outbox.offer(0, item);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_that_does_not_answer_holds_few_parcels_and_then_some_again_after_a_while() {
+    fn a_link_without_acknowledgements_holds_few_parcels_and_sends_more_after_a_timeout() {
         let mut outbox = Outbox::new(2);
         let mut n_sent = 0;
         for ms in 0..10_000 {
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acknowledgement_makes_room_and_says_what_was_lost_before_it() {
+    fn an_acknowledgement_frees_space_and_reports_the_earlier_losses() {
         let mut outbox = Outbox::new(1);
         for item in 0..3 {
             outbox.offer(0, item);

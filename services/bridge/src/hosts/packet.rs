@@ -368,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packet_survives_the_way() {
+    fn a_packet_survives_a_round_trip() {
         let sent = bytes(|_| {}, b"picture");
         let got = Packet::parse(&sent, &EXPECTED).unwrap();
         assert_eq!((got.head, got.body), (head(), &b"picture"[..]));
@@ -380,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_the_number() {
+    fn impossible_values_are_refused_with_the_number() {
         let refused = |bytes: &[u8]| Packet::parse(bytes, &EXPECTED).unwrap_err().to_string();
         for (change, words) in [
             (
@@ -415,14 +415,14 @@ mod tests {
 
     proptest! {
         #[test]
-        fn one_changed_byte_is_noticed(at in 0_usize..135, by in 1_u8..) {
+        fn one_changed_byte_is_detected(at in 0_usize..135, by in 1_u8..) {
             let mut changed = bytes(|_| {}, b"picture");
             changed[at] ^= by;
             prop_assert!(Packet::parse(&changed, &EXPECTED).is_err());
         }
 
         #[test]
-        fn any_bytes_are_a_packet_or_refused(bytes: Vec<u8>) {
+        fn any_bytes_are_parsed_as_a_packet_or_refused(bytes: Vec<u8>) {
             let _parsed = Packet::parse(&bytes, &EXPECTED).is_ok();
         }
     }

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn signals_survive_the_way_and_every_changed_byte_is_noticed() {
+    fn signals_survive_a_round_trip_and_every_changed_byte_is_detected() {
         for it in all() {
             let bytes = it.to_bytes();
             assert_eq!(Signal::parse(&bytes), Ok(it));

@@ -248,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_ours_and_never_in_the_future() {
+    fn received_times_are_converted_to_the_local_clock_and_never_lie_in_the_future() {
         let now = now_nanos();
         let mut clock = Clock::default();
         let ahead = 7_000_000_000_000;

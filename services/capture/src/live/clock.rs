@@ -128,7 +128,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     #[test]
-    fn frames_that_were_held_up_keep_their_distances() {
+    fn frames_delayed_in_transit_keep_their_intervals() {
         let mut map = ClockMap::default();
         let of = |(nth, delay): (u64, u64)| {
             let presented = (nth * 40 * MS).cast_signed();
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_set_is_followed_at_once() {
+    fn a_change_of_the_clock_is_followed_at_once() {
         let mut map = ClockMap::default();
         map.taken_at(0, 1_000 * MS);
         let later = map.taken_at(3_600_000 * MS as i64, 1_040 * MS);
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_that_stays_is_the_least_after_the_window() {
+    fn a_constant_delay_becomes_the_minimum_delay_after_the_window() {
         let mut map = ClockMap::default();
         map.taken_at(0, 0);
         let mut last = 0;
@@ -176,21 +176,21 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_on_the_clock_of_this_machine_has_its_delay_taken_out() {
+    fn the_delay_of_a_camera_that_uses_the_clock_of_this_machine_is_removed() {
         let taken = 1_000 * MS + 99 * 40 * MS;
         let held_up = |nth: u64| if nth.is_multiple_of(9) { 30 } else { 140 };
         assert_eq!(judged(0, held_up), (Verdict::Right, 30, Some(taken)));
     }
 
     #[test]
-    fn a_clock_by_which_pictures_come_from_the_future_or_much_too_late_is_not_believed() {
+    fn a_clock_that_dates_pictures_in_the_future_or_too_far_in_the_past_is_rejected() {
         assert_eq!(judged(50, |_| 30), (Verdict::Wrong, -20, None));
         assert_eq!(judged(-3_600_000, |_| 30).0, Verdict::Wrong);
         assert_eq!(judged(0, |_| 151), (Verdict::Wrong, 151, None));
     }
 
     #[test]
-    fn a_clock_that_was_believed_is_not_left_for_a_moment_and_one_that_was_set_is_judged_anew() {
+    fn a_trusted_clock_survives_a_short_error_and_a_changed_clock_is_judged_again() {
         let mut clock = OwnClock::default();
         let mut at = 0;
         let mut seconds = |n: u64, ahead: i64, clock: &mut OwnClock| {
@@ -217,7 +217,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_times_of_a_camera_are_judged(times in prop::collection::vec(any::<(i64, i64, u64)>(), 1..50)) {
+        fn any_camera_times_get_a_verdict(times in prop::collection::vec(any::<(i64, i64, u64)>(), 1..50)) {
             let mut clock = OwnClock::default();
             for (taken, arrived, at) in times {
                 let got = clock.taken_at([taken, arrived], at);
@@ -226,7 +226,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_is_taken_after_it_arrived(times in prop::collection::vec(any::<(i64, u32)>(), 1..50)) {
+        fn no_capture_time_is_later_than_the_arrival(times in prop::collection::vec(any::<(i64, u32)>(), 1..50)) {
             let mut map = ClockMap::default();
             let mut now = 0;
             for (presented, pause) in times {

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_of_the_same_rate_keeps_its_phase_whatever_it_jitters() {
+    fn a_camera_of_the_same_rate_keeps_its_phase_despite_jitter() {
         for phase in [0.0, 0.3, 0.5, -0.45] {
             let jitter = |nth: u64| if nth.is_multiple_of(2) { 0.04 } else { -0.04 };
             let all = placed((1..200).map(|nth| nth as f64 + phase + jitter(nth)));
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_at_29_97_beside_30_leaves_out_one_instant_in_a_thousand() {
+    fn a_camera_at_29_97_hz_misses_one_in_a_thousand_instants_at_30_hz() {
         let all = placed((0..9990).map(|nth| f64::from(nth) * 30.0 / 29.97));
         let last = all.iter().flatten().last().unwrap();
         assert_eq!(n_surplus(&all), 0);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_camera_of_twice_the_rate_every_second_picture_is_taken_the_nearest() {
+    fn at_twice_the_rate_the_nearest_picture_of_each_instant_is_used() {
         let all = placed((0..400).map(|nth| f64::from(nth) * 0.5));
         let settled = &all[20..];
         assert_eq!(n_surplus(settled), settled.len() / 2);
@@ -189,14 +189,14 @@ mod tests {
     }
 
     #[test]
-    fn of_a_camera_of_half_the_rate_every_second_instant_is_left_out() {
+    fn at_half_the_rate_every_second_instant_has_no_picture() {
         let all = placed((0..100).map(|nth| f64::from(nth) * 2.0));
         let expected: Vec<Option<u64>> = (0..100).map(|nth| Some(nth * 2)).collect();
         assert_eq!(all, expected);
     }
 
     #[test]
-    fn pictures_before_the_first_instant_have_none() {
+    fn pictures_before_the_first_instant_belong_to_no_instant() {
         assert_eq!(
             placed([-3.0, -0.9, -0.2, 1.0]),
             [None, None, Some(0), Some(1)]
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn clocks_that_repeat_go_back_or_are_of_another_day_are_wrong() {
+    fn timestamps_that_repeat_go_back_or_belong_to_another_day_are_wrong() {
         let mut grid = Grid::new(START, 30.0);
         let at = START + 7;
         assert_eq!(grid.wrong_clock(at, at), None);
@@ -219,7 +219,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn instants_are_never_taken_twice_and_never_far(
+        fn no_instant_is_used_twice_or_by_a_distant_picture(
             times in prop::collection::vec(0.0..100.0, 1..100),
         ) {
             let mut times = times;

@@ -384,7 +384,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_number_that_is_passed_over_is_missing() {
+    fn every_skipped_frame_number_counts_as_missing() {
         assert_eq!(missing(None, 17), 0);
         assert_eq!(missing(Some(17), 18), 0);
         assert_eq!(missing(Some(17), 21), 3);
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_of_a_stream_are_counted_in_periods() {
+    fn gaps_in_a_stream_are_counted_in_frame_periods() {
         for (gap, expected) in [(0, 0), (33, 0), (45, 0), (66, 1), (100, 2), (-500, 0)] {
             assert_eq!(
                 missing_by_time(gap * 1_000_000, 1e9 / 30.0),

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_lost_and_has_a_number() {
+    fn pictures_beyond_the_limit_are_lost_and_keep_their_numbers() {
         let originals = Originals::default();
         originals.connected();
         for _ in 0..3 {
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_get_the_times_of_their_decoded_pictures() {
+    fn encoded_pieces_get_the_times_of_their_decoded_pictures() {
         let originals = Arc::new(Originals::default());
         let mut kept = KeptStream::new(Arc::clone(&originals), Size::new(2, 2));
         let piece = |kind, ms: u64| Piece {

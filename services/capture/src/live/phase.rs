@@ -144,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_whose_clock_is_a_little_fast_is_told_within_a_minute() {
+    fn a_slightly_fast_camera_clock_is_detected_within_a_minute() {
         let phase = after(60, PERIOD as f64 * (1.0 - 30e-6), 500_000);
         let ppm = phase.drift_ppb().unwrap() as f64 / 1e3;
         assert!((ppm + 30.0).abs() < 5.0, "{ppm}");
     }
 
     #[test]
-    fn a_change_of_clock_is_no_drift() {
+    fn a_change_of_the_clock_is_not_reported_as_drift() {
         let mut phase = after(60, PERIOD as f64, 0);
         phase.by_clock(true);
         assert_eq!((phase.skew_nanos(), phase.drift_ppb()), (None, None));
@@ -164,14 +164,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_before_enough_was_measured() {
+    fn no_drift_is_reported_before_enough_measurements() {
         assert_eq!(Phase::new(PERIOD).skew_nanos(), None);
         let phase = after(3, PERIOD as f64, 0);
         assert_eq!((phase.skew_nanos(), phase.drift_ppb()), (Some(0), None));
     }
 
     #[test]
-    fn numbers_that_cannot_be_do_not_overflow() {
+    fn impossible_numbers_do_not_overflow() {
         let mut phase = Phase::new(0);
         for nth in 0..200_u64 {
             let skew = if nth % 2 == 0 { i64::MAX } else { i64::MIN };

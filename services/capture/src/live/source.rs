@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_picture_makes_room_and_every_picture_is_counted() {
+    fn the_oldest_picture_is_dropped_if_the_queue_is_full_and_every_picture_is_counted() {
         let keeper = keeper();
         for nth in 0..N_WAITING as u8 + 3 {
             keeper.post(taken(u64::from(nth % 2), true), vec![nth; 3], None);
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_is_not_there_is_trouble_and_the_thread_ends_when_it_is_dropped() {
+    fn a_missing_camera_is_reported_and_dropping_the_source_ends_its_thread() {
         let source = Source::start(&keeper().camera, Size::new(1, 1), None).unwrap();
         while source.trouble().is_none() {
             assert!(source.next(Duration::from_millis(10)).is_none());
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_is_told_once_there_are_pictures_enough() {
+    fn the_rate_is_known_after_enough_pictures() {
         let mut pace = Pace::default();
         let rates = (0..100_u64).map(|nth| pace.rate_hz(1, nth * 40_000_000));
         let rates: Vec<Option<f64>> = rates.collect();

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn after_a_gap_nothing_is_decoded_up_to_a_picture_that_needs_no_other() {
+    fn after_a_gap_decoding_continues_at_the_next_key_picture() {
         let mut state = State::Begin;
         let parts = [
             (b"MKV2", true, true),

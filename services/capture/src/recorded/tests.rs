@@ -89,7 +89,7 @@ fn read(spec: &SourceSpec) -> Vec<(u64, u8)> {
 }
 
 #[test]
-fn every_instant_has_the_nearest_picture_and_the_others_are_left_out() {
+fn every_instant_gets_the_nearest_picture_and_other_pictures_are_left_out() {
     let pictures = [
         (0, 2, 10),
         (1, 98, 11),
@@ -132,7 +132,7 @@ fn a_damaged_picture_is_left_out() {
 }
 
 #[test]
-fn what_a_recording_does_not_hold_is_said() {
+fn errors_of_recorded_sources_name_the_problem() {
     let (_folder, file) = recording(&[(0, 0, 10)]);
     let refused = |source: &str| {
         let spec = SourceSpec::new(source);

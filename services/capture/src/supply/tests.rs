@@ -58,7 +58,7 @@ fn under(faults: &str) -> Vec<String> {
 }
 
 #[test]
-fn a_fault_affects_its_own_frames_only() {
+fn a_fault_affects_only_its_own_frames() {
     let cases = [
         (
             "unplug@2+3",
@@ -107,7 +107,7 @@ fn without_a_previous_picture_a_freeze_has_no_effect() {
 }
 
 #[test]
-fn bad_files_affect_their_own_frames_only() {
+fn bad_files_affect_only_their_own_frames() {
     let (folder, spec) = images(6);
     save(folder.path(), 2, Size::new(6, 4));
     std::fs::write(folder.path().join("003.png"), "no picture").unwrap();
@@ -116,7 +116,7 @@ fn bad_files_affect_their_own_frames_only() {
 }
 
 #[test]
-fn recorded_footage_is_abandoned_after_repeated_failures_and_a_camera_is_not() {
+fn recorded_footage_is_abandoned_after_repeated_failures_but_a_camera_is_not() {
     let (folder, spec) = images(7);
     for nth in 1..5 {
         save(folder.path(), nth, Size::new(6, 4));
@@ -129,7 +129,7 @@ fn recorded_footage_is_abandoned_after_repeated_failures_and_a_camera_is_not() {
 }
 
 #[test]
-fn reopening_a_camera_is_not_tried_at_every_frame() {
+fn a_camera_is_not_reopened_at_every_frame() {
     let (folder, spec) = images(6);
     std::fs::write(folder.path().join("001.png"), "no picture").unwrap();
     let mut supply = open(&spec, "", true);
@@ -154,7 +154,7 @@ fn a_single_image_repeats_without_being_frozen() {
 }
 
 #[test]
-fn every_nth_frame_is_counted_by_its_index() {
+fn faults_apply_to_frame_indices_even_if_only_every_nth_frame_is_read() {
     let (_folder, spec) = images(12);
     let spec = SourceSpec {
         start: 1,
@@ -168,7 +168,7 @@ fn every_nth_frame_is_counted_by_its_index() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
     #[test]
-    fn every_frame_has_one_outcome_with_any_faults(
+    fn every_frame_has_exactly_one_outcome_for_any_faults(
         kinds in prop::collection::vec((0..8_usize, 0..12_u64, 1..8_u64), 0..4),
         skips in prop::collection::vec(0..3_u64, 12), is_live: bool,
     ) {

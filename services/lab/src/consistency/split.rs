@@ -100,14 +100,14 @@ mod tests {
     }
 
     #[test]
-    fn the_last_fourth_of_the_subjects_is_held_out() {
+    fn the_last_quarter_of_the_subjects_is_held_out() {
         let subjects = ["s1", "s2", "s3", "s9", "s10", "s10", "s4", "s5"];
         assert_eq!(held(&subjects, &[]).unwrap(), ["s9", "s10", "s10"]);
         assert_eq!(held(&["s1", "s2"], &["s1"]).unwrap(), ["s1"]);
     }
 
     #[test]
-    fn somebody_must_be_left_to_learn_from() {
+    fn at_least_one_subject_must_remain_for_training() {
         assert!(held(&["s1"], &[]).unwrap_err().contains("no subject is left"));
         let said = held(&["s1", "s2"], &["s3"]).unwrap_err();
         assert!(

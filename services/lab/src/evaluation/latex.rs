@@ -117,7 +117,7 @@ mod tests {
     use crate::evaluation::testing::made_up;
 
     #[test]
-    fn the_tables_have_our_numbers_and_the_papers() {
+    fn the_tables_contain_our_numbers_and_those_of_the_paper() {
         let (summary, versions) = made_up();
         let text = latex(&summary, &versions);
         assert!(

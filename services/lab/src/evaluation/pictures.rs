@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_for_latex_say_every_number_and_escape_names() {
+    fn the_latex_tables_contain_every_number_and_escape_names() {
         let tex = pictures_latex(&[pictures()], &Bootstrap::default());
         assert_eq!(tex.matches("\\begin{table}").count(), 4);
         assert!(

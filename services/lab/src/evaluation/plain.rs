@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_is_found_and_a_wrong_view_left_out() {
+    fn a_point_is_triangulated_and_a_wrong_view_is_left_out() {
         let cameras = [0.0, 0.7, 1.6, 2.9].map(camera);
         let truth = Point3::new(0.2, 0.3, -0.1);
         let mut views: Vec<Sighting<'_>> = cameras

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_predicts_itself() {
+    fn the_true_errors_are_a_perfect_prediction() {
         let views: Vec<Predicted> = (1..9).map(|i| view(i as f32, 4.0, i as f32)).collect();
         let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(1.0), Some(1.0)));
@@ -143,14 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_is_chance_level() {
+    fn a_constant_prediction_has_chance_level() {
         let views: Vec<Predicted> = (1..9).map(|i| view(3.0, 4.0, i as f32)).collect();
         let all = &judge(&views.iter().collect::<Vec<_>>())[0];
         assert_eq!((all.auc, all.rank_correlation), (Some(0.5), None));
     }
 
     #[test]
-    fn without_thresholds_nothing_is_judged() {
+    fn without_thresholds_no_prediction_is_judged() {
         let mut alone = view(1.0, 1.0, 1.0);
         alone.tau_px.clear();
         assert_eq!(judge(&[&alone]), []);

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_papers_overall_values_are_means_weighted_by_frames() {
+    fn the_overall_values_of_the_paper_are_means_weighted_by_frames() {
         for column in 0..4 {
             let mut sum = 0.0;
             let mut n = 0.0;
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn values_outside_the_tables_are_none() {
+    fn values_outside_the_tables_are_missing() {
         let adaptive = Version {
             terms: Terms::Adaptive,
             combining: Combining::Pairs,

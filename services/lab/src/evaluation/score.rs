@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_body_with_its_sides_exchanged_is_told() {
+    fn a_body_with_swapped_sides_is_detected() {
         let truth: Vec<Option<Point>> = (0..14).map(|i| Some([f64::from(i), 0.0, 1.0])).collect();
         let mut found = truth.clone();
         assert_eq!(is_exchanged(&found, &truth), Some(false));

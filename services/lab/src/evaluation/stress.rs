@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_stress_is_read_as_it_is_written_and_others_are_refused() {
+    fn every_stress_test_is_parsed_from_its_written_form_and_others_are_refused() {
         for stress in Stress::ALL {
             assert_eq!(stress.to_string().parse(), Ok(stress));
         }
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn it_happens_to_every_view_in_turn() {
+    fn the_stress_affects_each_view_in_turn() {
         for stress in [Stress::Covered(2), Stress::Bystander] {
             let hit: Vec<Vec<usize>> = (0..4)
                 .map(|nth| (0..4).filter(|view| stress.hits(nth, *view, 4)).collect())
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_half_is_grey_and_the_other_as_it_was() {
+    fn covering_paints_one_half_grey_and_keeps_the_other_half() {
         for nth in 0..4 {
             let mut rgb = vec![9; 3 * 100 * 80];
             cover_half(&mut rgb, [100, 80], [20.0, 10.0, 60.0, 50.0], nth);

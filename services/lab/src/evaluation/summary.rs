@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_weight_frames_and_not_sequences() {
+    fn the_mean_of_a_group_weights_frames_equally_and_not_sequences() {
         let sequences = [
             measured("S1", "Box", &[[6, 9]; 3]),
             measured("S2", "Box", &[[12, 12]]),
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_of_a_version_is_counted() {
+    fn all_results_of_a_version_are_counted() {
         let got = summary(&[measured("S1", "Box", &[[6, 9]; 3])]);
         let [own] = &got.groups[..] else {
             panic!("{} groups", got.groups.len())

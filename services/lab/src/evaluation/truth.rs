@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn every_set_has_the_fourteen_joints() {
+    fn every_data_set_has_the_fourteen_joints() {
         for set in JointSet::ALL {
             let joints: Vec<Option<Point>> =
                 (0..set.joints.len()).map(|i| Some([i as f64, 0.0, 0.0])).collect();
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_off_by_a_tenth_of_the_person_is_at_one() {
+    fn a_part_that_is_off_by_a_tenth_of_the_person_has_a_relative_error_of_one() {
         let joints = standing();
         let mut found = parts(&joints).to_vec();
         found[6][0] += 20.1;
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_are_exchanged_where_that_may_be_and_fits_better() {
+    fn sides_are_swapped_if_that_is_allowed_and_fits_better() {
         let joints = standing();
         let truth = parts(&joints);
         let found: Vec<[f64; 2]> = (0..N_PARTS).map(|i| truth[MIRROR[i]]).collect();
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_joints_give_no_errors() {
+    fn unknown_joints_contribute_no_errors() {
         let mut joints = standing();
         let found = parts(&joints);
         joints[3] = [f64::NAN; 2];

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_picture_that_is_reduced_keeps_its_boxes_around_what_they_show() {
+    fn boxes_in_a_shrunk_picture_keep_their_content() {
         let [width, height] = [4 * SIDE, 2 * SIDE];
         let mut rgb = vec![0; 3 * width * height];
         for row in 40..80 {

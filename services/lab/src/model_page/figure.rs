@@ -198,7 +198,7 @@ mod tests {
     use crate::model_page::tests::planted;
 
     #[test]
-    fn the_types_that_rest_in_the_middle_are_drawn() {
+    fn the_part_types_whose_rest_position_is_in_the_middle_are_drawn() {
         let mut spec = planted("m");
         let edge = spec.parts[1].edge.as_mut().unwrap();
         edge.bias = vec![vec![0.0, 0.1, 9.0], vec![0.3, 0.2, 0.0]];

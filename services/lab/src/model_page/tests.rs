@@ -81,7 +81,7 @@ fn no_name_of_a_model_or_a_part_becomes_markup() {
 }
 
 #[test]
-fn nothing_comes_from_elsewhere() {
+fn the_page_loads_nothing_from_elsewhere() {
     let page = page(planted("person"));
     for word in ["<script", "http", "@import", "url(", "src="] {
         assert!(!page.contains(word), "{word}");
@@ -89,12 +89,12 @@ fn nothing_comes_from_elsewhere() {
 }
 
 #[test]
-fn one_page_is_one_page() {
+fn the_same_model_gives_the_same_page() {
     assert_eq!(page(planted("a")), page(planted("a")));
 }
 
 #[test]
-fn the_ellipse_is_where_the_spring_costs_what_it_says() {
+fn the_ellipse_is_drawn_at_the_stated_spring_cost() {
     let ellipse = Ellipse::of(&SPRING);
     assert_eq!(ellipse.centre, [3.0, 1.0]);
     let cost = |at: [f64; 2]| {
@@ -129,7 +129,7 @@ fn a_filter_without_positive_weights_is_an_empty_glyph() {
 
 proptest! {
     #[test]
-    fn any_name_leaves_the_page_whole(name: String) {
+    fn no_name_breaks_the_page(name: String) {
         let page = page(planted(&name));
         prop_assert_eq!(count(&page, "section"), 3);
         prop_assert_eq!(count(&page, "h1"), 1);

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_the_left_shoulder_on_the_right_of_the_picture_faces_the_camera() {
+    fn a_person_with_the_left_shoulder_on_the_right_of_the_picture_faces_the_camera() {
         let joints = standing();
         let [aside, towards] = front(&joints);
         assert!(towards > 0.99 && aside.abs() < 0.1, "{aside} {towards}");
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn who_bends_the_knees_to_the_right_of_the_picture_faces_there() {
+    fn a_person_whose_knees_point_to_the_right_of_the_picture_faces_right() {
         let mut joints = standing();
         for joint in &mut joints {
             joint[0] *= 0.1;

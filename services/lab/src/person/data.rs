@@ -223,14 +223,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sides_are_as_marked_unless_said() {
+    fn left_and_right_are_as_marked_by_default() {
         assert_eq!(sides_of(&[]).unwrap(), Sides::Marked);
         assert_eq!(sides_of(&["marked", "seen"]).unwrap(), Sides::Seen);
         assert_eq!(sides_of(&["left"]).unwrap_err().kind(), ExitKind::Usage);
     }
 
     #[test]
-    fn angles_are_what_was_written_after_no_turn() {
+    fn the_list_of_angles_begins_with_0_and_has_no_duplicates() {
         let angles = degrees(&["-15,-7.5", "7.5, 0,-15"]).unwrap();
         assert_eq!(angles, [0.0, -15.0, -7.5, 7.5]);
         for wrong in ["", "a", "nan", "inf", "181"] {

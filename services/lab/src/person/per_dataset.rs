@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_for_the_data_set_that_it_names() {
+    fn a_value_applies_to_the_data_set_that_it_names() {
         let datasets = paths(&["a", "a=b", "c/joints.mat"]);
         assert_eq!(whose(&datasets, "c/joints.mat=1-2"), Whose::One(2, "1-2"));
         assert_eq!(whose(&datasets, "a=1"), Whose::One(0, "1"));
@@ -86,14 +86,14 @@ mod tests {
     }
 
     #[test]
-    fn one_data_set_need_not_be_named() {
+    fn a_single_data_set_does_not_have_to_be_named() {
         let only = ["1-3".to_owned()];
         let dealt = deal(&paths(&["a"]), "--only", &only, false);
         assert_eq!(dealt.unwrap(), [["1-3"]]);
     }
 
     #[test]
-    fn of_two_data_sets_one_must_be_named_or_both_are_meant() {
+    fn with_two_data_sets_a_value_without_a_name_applies_to_both() {
         let two = paths(&["a", "b"]);
         let values = ["-15,15".to_owned(), "b=7".to_owned()];
         let dealt = deal(&two, "--rotate", &values, true).unwrap();

@@ -308,7 +308,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_take_as_long_as_those_of_their_kind_took() {
+    fn remaining_steps_are_assumed_to_take_as_long_as_earlier_steps_of_their_kind() {
         let learn = |batch| Step::Learn {
             round: 0,
             pass: 0,

@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_point_comes_back_and_the_square_shows_what_lies_there() {
+    fn crop_coordinates_are_invertible_and_the_crop_shows_the_right_pixels() {
         let joints = [[40.0, 20.0], [60.0, 90.0]];
         let crop = Crop::around(&joints, 0.7).unwrap();
         let at = crop.inside([47.0, 66.0]);

@@ -15,7 +15,7 @@ fn person(name: &str) -> Person {
 }
 
 #[test]
-fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
+fn people_survive_a_round_trip_through_a_file_and_a_truncated_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("people.bin");
     let people = Prepared {
@@ -36,7 +36,7 @@ fn people_are_read_as_they_were_written_and_a_file_that_was_cut_is_refused() {
 }
 
 #[test]
-fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
+fn the_written_card_is_valid_and_describes_the_input_of_the_network() {
     let shape = training::networks::pose::Shape::default();
     let text = training::networks::pose::card(&shape, &About::default());
     let card = keypoints::Card::parse(&text).unwrap();
@@ -50,7 +50,7 @@ fn the_card_that_is_written_is_one_and_says_what_the_network_takes() {
 }
 
 #[test]
-fn a_network_that_was_not_trained_fits_its_card_and_tells_front_and_errors() {
+fn an_untrained_network_fits_its_card_and_outputs_front_and_errors() {
     let shape = training::networks::pose::Shape {
         channels: [8, 8, 8, 8],
         blocks: [1, 1, 1, 1],

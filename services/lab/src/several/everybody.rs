@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn everybody_where_they_are_is_everything() {
+    fn finding_everybody_in_the_right_place_gives_a_perfect_score() {
         let truth = frames(60);
         let lines: Vec<FrameLine> = (0..60).map(|nth| line(nth, &[(1, 0.01), (2, 2.01)])).collect();
         let score = everybody(&truth, &lines, RATE_HZ);
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_phantom_somebody_missing_and_exchanged_names_are_told() {
+    fn phantoms_and_missing_people_and_swapped_ids_are_counted() {
         let truth = frames(60);
         let lines: Vec<FrameLine> = (0..60)
             .map(|nth| match nth {

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_is_right_up_to_half_its_length_on_the_mean_of_both_ends() {
+    fn a_part_is_correct_if_the_mean_error_of_its_ends_is_at_most_half_its_length() {
         let truth = [person(0, 0.0)];
         let mut score = Score::default();
         for off_m in [0.05, 0.4] {
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn people_are_the_nearest_and_a_change_of_the_id_is_counted() {
+    fn people_are_matched_to_the_nearest_truth_and_changes_of_id_are_counted() {
         let truth = [person(0, 0.0), person(1, 1.0)];
         let both = |ids: [u64; 2]| vec![put(ids[1], &truth[1], 0.01), put(ids[0], &truth[0], 0.02)];
         let mut score = Score::default();

@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn the_strongest_fields_make_people_and_the_rest_is_loose() {
+    fn the_strongest_fields_connect_joints_to_people_and_other_joints_stay_unassigned() {
         let (mut candidates, mut fields) = candidates();
         // A third right wrist, which no field connects to another keypoint.
         candidates[4].push([300.0, 40.0, 0.5]);
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_ends_too_early_is_told_by_the_number() {
+    fn the_error_for_a_truncated_file_names_the_number_of_bytes() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("gt.txt");
         fs::write(&file, "15 2 1 0 0.5 0.5").unwrap();

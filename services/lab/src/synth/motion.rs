@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_fit_into_those_of_deployments() {
+    fn motion_names_are_valid_in_deployment_names() {
         for (file, expected) in [
             ("a/CMU_02_05.c3d", "cmu-02-05"),
             ("Marché très longue course.trc", "march--tr-s-long"),
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_frames_than_were_recorded() {
+    fn no_more_frames_are_made_than_were_recorded() {
         let posture = Posture {
             joints: [[0.0; 3]; 14],
             toes: None,

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{Drawn, assert_ended};
 
 #[test]
-fn pictures_are_prepared_a_network_learns_from_them_and_is_judged_on_those_kept_apart() {
+fn a_detector_is_trained_on_prepared_pictures_and_judged_on_held_out_ones() {
     let drawn = Drawn::new(240);
     let words = ["train", "finder-pictures", "people.jsonl", "--json"];
     let ended = drawn.start(&[&words[..], &["--out", "pictures.bin"]].concat()).wait();

@@ -71,7 +71,7 @@ impl Drawn {
 }
 
 #[test]
-fn knees_that_are_marked_lower_are_found_lower_with_the_file_that_was_learned() {
+fn a_learned_joint_map_moves_the_knees_to_where_they_were_marked() {
     let drawn = Drawn::with_low_knees();
     let learned = drawn.learn_joints("one.joints", &["--threads", "1", "--json"]);
     assert_ended(&learned, 0, &[]);
@@ -102,7 +102,7 @@ fn knees_that_are_marked_lower_are_found_lower_with_the_file_that_was_learned() 
 }
 
 #[test]
-fn joints_of_another_model_are_refused_and_so_are_too_few_people() {
+fn a_joint_map_of_another_model_and_too_few_people_are_refused() {
     let drawn = Drawn::with_low_knees();
     let few = drawn.learn_joints("few.joints", &["--only", "1-19"]);
     assert_ended(&few, 4, &["people were found, expected 20"]);

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::{Drawn, assert_ended};
 
 #[test]
-fn people_are_prepared_and_one_block_in_twelve_is_kept_apart() {
+fn people_are_prepared_and_one_block_in_twelve_is_held_out() {
     let drawn = Drawn::new(240);
     let words = ["train", "network-people", "people.jsonl", "--sides", "seen"];
     let ended = drawn.start(&[&words[..], &["--json", "--out", "people.bin"]].concat()).wait();
@@ -17,7 +17,7 @@ fn people_are_prepared_and_one_block_in_twelve_is_kept_apart() {
 }
 
 #[test]
-fn people_that_are_not_there_are_named_and_settings_can_be_printed() {
+fn missing_people_are_named_in_the_error_and_settings_can_be_printed() {
     let drawn = Drawn::new(1);
     let words = ["train", "network", "people.bin", "--out", "n.onnx"];
     let ended = drawn.start(&words).wait();

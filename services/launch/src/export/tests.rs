@@ -96,7 +96,7 @@ fn exported(origin: &Origin, job: &Job) -> Result<Vec<Written>, Failure> {
 }
 
 #[test]
-fn a_folder_is_written_once_and_again_only_by_force() {
+fn an_export_folder_is_overwritten_only_with_force() {
     let folder = run(&[("pose3d.jsonl", &lines(3))]);
     let origin = Origin::read(folder.path(), &given()).unwrap();
     let mut job = job(folder.path(), &["c3d", "csv", "csv-long", "trc"]);
@@ -120,7 +120,7 @@ fn a_folder_is_written_once_and_again_only_by_force() {
 }
 
 #[test]
-fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
+fn each_of_several_people_has_a_numbered_file_and_a_single_person_has_none() {
     let text: String = [
         line(0, &[person(4, 4.0), person(1, 1.0)]),
         line(1, &[person(4, 4.0)]),
@@ -181,7 +181,7 @@ fn each_of_several_people_has_a_file_and_one_alone_the_simple_name() {
 }
 
 #[test]
-fn people_that_cannot_be_are_refused_with_the_line_and_the_field() {
+fn impossible_people_are_refused_with_the_line_and_the_field() {
     let refused = |people: &[String]| {
         let text = line(0, &[person(1, 1.0)]) + &line(1, people);
         let folder = run(&[("pose3d.jsonl", &text)]);
@@ -212,7 +212,7 @@ fn people_that_cannot_be_are_refused_with_the_line_and_the_field() {
 }
 
 #[test]
-fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
+fn export_asks_for_missing_information_before_it_writes_a_file() {
     let timeless = lines(2).replace("\"time_s\":0.02", "\"time_s\":null");
     let timeless = timeless.replace("\"time_s\":0,", "\"time_s\":null,");
     let folder = run(&[("pose3d.jsonl", &timeless)]);
@@ -250,7 +250,7 @@ fn what_a_run_does_not_tell_is_asked_for_before_anything_is_written() {
 }
 
 #[test]
-fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
+fn exporting_an_incomplete_run_warns_and_a_run_without_joints_is_refused() {
     let text = lines(3);
     let cut = run(&[("pose3d.jsonl.part", &text[..text.len() - 9])]);
     let origin = Origin::read(cut.path(), &given()).unwrap();
@@ -279,7 +279,7 @@ fn runs_that_are_not_whole_say_so_and_those_without_a_joint_are_refused() {
 }
 
 #[test]
-fn a_stop_ends_it_and_leaves_no_half_file() {
+fn a_stop_request_ends_the_export_and_leaves_no_partial_file() {
     let folder = run(&[("pose3d.jsonl", &lines(3))]);
     let origin = Origin::read(folder.path(), &given()).unwrap();
     let stop = Stop::new().unwrap();

@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_found_in_a_turned_picture_is_where_it_was() {
+    fn joints_found_in_a_rotated_picture_are_mapped_back_to_the_original_picture() {
         for roll in [-2.5, -0.4, 0.45, FRAC_PI_2, 3.0] {
             let mut upright = Upright::new(SIZE, roll).unwrap().unwrap();
             // Corners are not cropped.
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_turn_clockwise_as_seen() {
+    fn pictures_are_rotated_clockwise_as_seen() {
         let mut upright = Upright::new(SIZE, FRAC_PI_2).unwrap().unwrap();
         let size = upright.size();
         // A point at the top moves to the right.
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_hardly_leans_is_left_alone() {
+    fn slightly_tilted_pictures_are_not_rotated() {
         assert!(Upright::new(SIZE, 0.05).unwrap().is_none());
         assert!(Upright::new(SIZE, 0.0).unwrap().is_none());
     }

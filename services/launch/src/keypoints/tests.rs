@@ -39,7 +39,7 @@ fn deployment(folder: &Path, more: &str, set: &[&str]) -> Deployment {
 }
 
 #[test]
-fn a_camera_without_footage_gets_grey_frames_of_its_size_as_many_as_keypoints() {
+fn a_camera_without_footage_gets_one_grey_frame_per_keypoint_frame() {
     let folder = folder();
     let deployment = deployment(folder.path(), "", &["capture.frame_rate_hz=50"]);
     let lengths = lengths(&deployment).unwrap();
@@ -60,7 +60,7 @@ fn without_a_frame_rate_there_are_no_grey_frames() {
 }
 
 #[test]
-fn keypoints_that_cannot_be_read_are_an_error_of_the_input_with_the_file() {
+fn unreadable_keypoints_are_an_input_error_that_names_the_file() {
     let folder = folder();
     let deployment = deployment(folder.path(), "keypoint_names = 'coco-17'\n", &[]);
     let source = of_camera(&deployment.cameras[1]).unwrap().unwrap();
@@ -76,7 +76,7 @@ fn keypoints_that_cannot_be_read_are_an_error_of_the_input_with_the_file() {
 }
 
 #[test]
-fn footage_of_another_length_than_its_keypoints_is_told_with_both_numbers() {
+fn different_lengths_of_footage_and_keypoints_are_reported_with_both_numbers() {
     let folder = folder();
     let warnings = |n_frames: u64, set: &[&str]| {
         let footage = Footage {

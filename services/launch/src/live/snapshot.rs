@@ -214,14 +214,14 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn processes_are_in_pipeline_order_and_by_index() {
+    fn processes_are_sorted_by_pipeline_order_and_index() {
         let names: Vec<String> =
             snapshot().processes.into_iter().map(|process| process.name).collect();
         assert_eq!(names, ["capture-9", "capture-10", "pose-0", "results"]);
     }
 
     #[test]
-    fn a_live_process_with_metrics_runs_until_it_is_done() {
+    fn a_live_process_with_metrics_is_shown_as_running_until_it_has_finished() {
         let mut metrics = metrics_of(17, None);
         let now = 11 * SECOND;
         assert_eq!(state(Some(17), Some(&metrics), now), State::Running);
@@ -230,14 +230,14 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_process_that_is_not_alive_is_dead_whatever_its_metrics() {
+    fn a_process_that_is_not_alive_is_shown_as_dead_despite_its_metrics() {
         let metrics = metrics_of(17, None);
         assert_eq!(state(None, Some(&metrics), 11 * SECOND), State::Dead);
         assert_eq!(state(None, None, 11 * SECOND), State::Dead);
     }
 
     #[test]
-    fn metrics_from_before_a_restart_do_not_count() {
+    fn metrics_from_before_a_restart_are_ignored() {
         let metrics = metrics_of(16, None);
         assert_eq!(
             state(Some(17), Some(&metrics), 11 * SECOND),
@@ -247,7 +247,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_process_without_metrics_for_five_seconds_is_silent() {
+    fn a_process_without_metrics_for_five_seconds_is_shown_as_silent() {
         let metrics = metrics_of(17, None);
         assert_eq!(state(Some(17), Some(&metrics), 15 * SECOND), State::Running);
         assert_eq!(state(Some(17), Some(&metrics), 16 * SECOND), State::Silent);
@@ -272,7 +272,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_names_of_views_are_those_in_the_metrics() {
+    fn the_names_of_views_come_from_the_metrics() {
         assert_eq!(snapshot().views(), [(0, "left")].into());
     }
 }

@@ -272,7 +272,7 @@ results  waiting     all       100   20.0  ";
     }
 
     #[test]
-    fn the_number_of_people_is_shown_where_it_is_counted() {
+    fn the_number_of_people_is_shown_for_processes_that_count_people() {
         let mut snapshot = snapshot();
         assert!(!table(&snapshot).contains("people"));
         snapshot.processes[3].reading.as_mut().unwrap().n_people = Some(3);
@@ -326,7 +326,7 @@ results  waiting     all       100   20.0  ";
     }
 
     #[test]
-    fn short_times_have_microseconds_and_long_ones_do_not() {
+    fn short_times_are_shown_in_microseconds_and_long_times_are_not() {
         assert_eq!(milliseconds(1_234), "0.001");
         assert_eq!(milliseconds(9_999_400), "9.999");
         assert_eq!(milliseconds(12_345_678), "12.3");

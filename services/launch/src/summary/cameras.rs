@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_of_which_some_tell_the_time_are_named() {
+    fn a_warning_names_the_cameras_if_only_some_have_timestamps() {
         let streams = [
             camera("left", TimedBy::CAMERA),
             camera("middle", TimedBy::DISBELIEVED),
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_not_believed_is_told_with_what_it_says() {
+    fn a_rejected_clock_is_reported_with_its_times() {
         let (_, mut it) = camera("left", TimedBy::DISBELIEVED);
         it.delay_nanos = -90_000_000_000;
         let text = times(&it).unwrap();
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_is_out_of_step_is_named_with_its_offset() {
+    fn a_camera_with_a_wrong_clock_offset_is_named_with_the_offset() {
         let fit = CameraFit {
             offset_error_ms: Some(1.2),
             offset_ms: Some(-21.4),

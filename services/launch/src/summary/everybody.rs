@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn several_people_have_a_row_each_with_a_verdict() {
+    fn each_of_several_people_has_a_row_with_a_verdict() {
         assert_eq!(table(&people(1)), "");
         let text = table(&people(10));
         let rows: Vec<&str> = text.lines().collect();

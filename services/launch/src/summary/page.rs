@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_are_called_by_their_frame() {
+    fn picture_files_are_named_after_their_frames() {
         assert_eq!(caption("000000.png"), "frame 0");
         assert_eq!(caption("000120.png"), "frame 120");
     }

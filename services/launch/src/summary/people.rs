@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn people_that_are_too_large_or_too_small_are_told_with_a_scale_that_helps() {
+    fn people_who_are_too_large_or_too_small_give_a_warning_with_a_better_scale() {
         let said = outside(1.0, [Some(620.0), Some(300.0)]).unwrap();
         assert_eq!(
             said,
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_of_people_of_a_good_height_or_of_nobody() {
+    fn people_of_a_good_height_and_empty_rooms_give_no_warning() {
         assert_eq!(outside(1.0, [Some(110.0), Some(350.0)]), None);
         assert_eq!(outside(1.0, [None, None]), None);
     }

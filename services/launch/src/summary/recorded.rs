@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_summary_of_another_session_counts_as_none() {
+    fn the_summary_of_another_session_is_ignored() {
         let text = run().to_text().unwrap();
         assert_eq!(read(&text, &["c1"]).written(), Some(&run()));
         let earlier = text.replace("\"session\": 7", "\"session\": 6");

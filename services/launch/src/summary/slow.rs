@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn the_share_of_people_who_were_predicted_is_told() {
+    fn the_fraction_of_predicted_people_is_reported() {
         let summary = |sightings_predicted| Summary {
             sightings: 400,
             sightings_predicted,
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn a_machine_that_had_time_for_few_frames_is_told() {
+    fn a_machine_that_processed_few_frames_is_reported() {
         let told = text(&summary(6), 60, 8.0, false).unwrap();
         assert!(told.contains("6 of 60 frames, 0.8 per second"), "{told}");
         assert_eq!(text(&summary(50), 60, 8.0, false), None);

@@ -79,7 +79,7 @@ mod tests {
     use nalgebra::Vector3;
 
     #[test]
-    fn a_vertical_is_kept_for_the_cameras_it_was_found_for() {
+    fn a_stored_vertical_is_used_only_for_the_cameras_it_was_found_for() {
         let folder = tempfile::tempdir().unwrap();
         let rig = folder.path().join("rig.toml");
         let cameras = ring(&[0.0, 5.0], Vector3::z_axis());

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn heads_above_ankles_tell_the_vertical_however_cameras_are_rolled() {
+    fn heads_above_ankles_determine_the_vertical_for_any_camera_roll() {
         let odd = UnitVector3::new_normalize(Vector3::new(0.5, -0.7, 0.4));
         for up in [Vector3::z_axis(), -Vector3::y_axis(), odd] {
             for rolls in [
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn without_people_or_without_agreement_there_is_none() {
+    fn without_people_or_without_agreement_no_vertical_is_found() {
         assert!(vertical(&[]).is_none());
         let mut lying = seen(&[0.0; 4], Vector3::z_axis(), 0.0);
         for (nth, it) in lying.iter_mut().enumerate() {

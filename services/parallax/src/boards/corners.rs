@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_is_read_as_it_was_written_and_refused_where_it_is_cut() {
+    fn a_table_survives_a_round_trip_and_a_truncated_table_is_refused() {
         let names = ["left".to_owned(), "cam_7".to_owned()];
         let board: Vec<_> = (0..4).map(|i| Point2::new(f64::from(i) * 0.05, 0.05)).collect();
         let corners = (0..4).map(|id| (id, Point2::new(10.5 + id as f64, 20.25)));

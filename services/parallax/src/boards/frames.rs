@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nth_row_of_a_camera_is_its_nth_picture() {
+    fn the_nth_row_of_a_camera_belongs_to_its_nth_picture() {
         let text = "sync_index,cam_id,frame_time\n35,2,25.0\n35,3,25.1\n36,2,25.2\n38,2,25.5\n";
         let table = table(text).unwrap();
         assert_eq!(table.of("cam_2"), Some(&[35, 36, 38][..]));

@@ -253,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_program_that_is_not_there_and_a_limit_that_is_too_low_come_with_advice() {
+    fn a_missing_program_and_a_low_limit_are_reported_with_advice() {
         let finding = program("parallax-no-such-program", State::Missing);
         assert_eq!(finding.state, State::Missing);
         assert!(finding.advice.is_some());

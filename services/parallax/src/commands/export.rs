@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_are_named_once_each_and_others_are_refused() {
+    fn duplicate_formats_are_merged_and_unknown_ones_are_refused() {
         assert_eq!(names("glb, c3d,glb"), Ok(vec!["glb", "c3d"]));
         assert_eq!(names("all,csv").unwrap().len(), Format::all().len());
         let error = names("c3d,fbx").unwrap_err();
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_and_names_that_are_none_are_refused() {
+    fn invalid_directions_and_names_are_refused() {
         assert_eq!(up("0,0,2").unwrap(), Vector3::z_axis());
         assert_eq!(up("0, -1, 0").unwrap(), -Vector3::y_axis());
         for text in ["", "1,2", "0,0,0", "a,b,c", "1,2,3,4", "nan,0,0", "inf,0,0"] {

@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_of_recorded_stages_may_not_be_replaced() {
+    fn settings_of_recorded_stages_cannot_be_replaced() {
         let may = |key, from| refused(key, from).is_none();
         assert!(may("paper.alpha", Stage::Fuse) && may("rig", Stage::Fuse));
         assert!(!may("paper.workers", Stage::Triangulate));

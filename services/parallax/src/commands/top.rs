@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pauses_are_limited() {
+    fn the_refresh_interval_is_limited() {
         assert_eq!(pause("0.5"), Ok(0.5));
         for wrong in ["0", "-1", "nan", "inf", "x", "3601"] {
             assert!(pause(wrong).is_err(), "{wrong}");

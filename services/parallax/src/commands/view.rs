@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tokens_are_long_and_plain() {
+    fn tokens_are_long_and_have_only_plain_characters() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("token");
         let token = |text: &str| {
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_means_a_recording_a_folder_or_a_deployment() {
+    fn the_argument_is_recognised_as_a_recording_a_folder_or_a_deployment() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().to_str().unwrap();
         let got = subject(Some(path)).unwrap();

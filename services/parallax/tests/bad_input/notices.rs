@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::{Case, PLAIN};
 
 #[test]
-fn comments_of_shipped_files_name_the_origin_of_their_data() {
+fn comments_of_included_files_name_the_origin_of_their_data() {
     // The files are in a separate folder, as in a fresh clone.
     let case = Case::new("oops-clone", &[2; 2], PLAIN);
     let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
@@ -38,7 +38,7 @@ fn comments_of_shipped_files_name_the_origin_of_their_data() {
 }
 
 #[test]
-fn shipped_files_are_found_from_any_program_location() {
+fn included_files_are_found_from_any_program_location() {
     let case = Case::new("oops-ships", &[2; 2], PLAIN);
     case.edit(
         "deployment.toml",

@@ -106,7 +106,7 @@ fn problem(schema: &Value, value: &Value) -> Option<String> {
 }
 
 #[test]
-fn messages_are_as_the_schemas_of_foxglove_say_and_the_cameras_come_first() {
+fn messages_match_the_schemas_of_foxglove_and_cameras_come_first() {
     let mut foxglove = foxglove();
     let topics = foxglove.topics();
     let mut two = one(1);
@@ -146,7 +146,7 @@ fn messages_are_as_the_schemas_of_foxglove_say_and_the_cameras_come_first() {
 }
 
 #[test]
-fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them() {
+fn a_skeleton_becomes_spheres_for_joints_and_spreads_and_lines_for_limbs() {
     let mut foxglove = foxglove();
     let all = shown(&mut foxglove, &one(1));
     let entity = &all[3].1["entities"][0];
@@ -165,7 +165,7 @@ fn a_skeleton_is_its_joints_with_a_place_their_spread_and_the_lines_between_them
 }
 
 #[test]
-fn what_has_no_picture_and_what_ends_makes_no_message() {
+fn missing_pictures_and_ends_of_streams_give_no_message() {
     let mut foxglove = foxglove();
     let head = FrameHeader {
         width: 8,

@@ -145,7 +145,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_time_between_two_frames_stays_the_same(
+        fn the_time_between_two_frames_is_unchanged(
             [first, second] in prop::array::uniform2(0_u64..1 << 60), pace in 0.1..10.0,
         ) {
             let clock = Clock { recorded: 0, length: 1 << 60, planned: 1 << 61, pace: Pace::Times(pace) };

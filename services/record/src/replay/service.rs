@@ -270,7 +270,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_view_of_an_end_is_that_of_its_topic() {
+    fn the_view_of_an_end_of_stream_is_taken_from_its_topic() {
         assert_eq!(view_in(&topic::frame(0)), 0);
         assert_eq!(view_in(&topic::view_pose(13)), 13);
         assert_eq!(view_in(&topic::pair_pose(2)), 2);

@@ -23,7 +23,7 @@ fn text(dir: &tempfile::TempDir, name: &str) -> String {
 }
 
 #[test]
-fn all_files_are_there_at_the_end_and_no_part() {
+fn all_files_are_complete_at_the_end_and_no_partial_file_is_left() {
     let (dir, _) = written(vec![record(0), record(2)]);
     let mut names: Vec<String> = fs::read_dir(dir.path())
         .unwrap()
@@ -49,7 +49,7 @@ fn all_files_are_there_at_the_end_and_no_part() {
 }
 
 #[test]
-fn a_file_that_must_say_the_rate_is_not_written_where_nothing_tells_it() {
+fn a_file_that_needs_the_frame_rate_is_not_written_without_one() {
     let dir = tempfile::tempdir().unwrap();
     let folder = Folder::open(dir.path(), false).unwrap();
     let scene = Scene {
@@ -127,7 +127,7 @@ fn a_restarted_recorder_counts_what_it_had_written() {
 }
 
 #[test]
-fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
+fn every_frame_is_in_all_result_files() {
     let dir = tempfile::tempdir().unwrap();
     let folder = Folder::open(dir.path(), false).unwrap();
     let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
@@ -173,7 +173,7 @@ fn every_frame_has_a_line_a_row_of_every_joint_and_one_for_opensim() {
 }
 
 #[test]
-fn what_a_full_disk_does_not_take_is_not_counted_as_written_and_its_file_is_not_called_whole() {
+fn a_file_cut_by_a_full_disk_is_not_counted_as_written_and_not_renamed() {
     let dir = tempfile::tempdir().unwrap();
     let folder = Folder::open(dir.path(), false).unwrap();
     let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();
@@ -190,7 +190,7 @@ fn what_a_full_disk_does_not_take_is_not_counted_as_written_and_its_file_is_not_
 }
 
 #[test]
-fn files_of_everybody_have_everybody_and_those_of_one_who_is_followed() {
+fn some_files_list_everybody_and_others_only_the_followed_person() {
     let dir = tempfile::tempdir().unwrap();
     let folder = Folder::open(dir.path(), false).unwrap();
     let mut output = Output::begin(scene(), &Config::default(), 1, folder).unwrap();

@@ -108,18 +108,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_those_of_the_optimiser() {
+    fn the_defaults_equal_those_of_the_optimiser() {
         let expected = Settings::default();
         assert_eq!(settings(&Config::default(), 1.0, None), expected);
     }
 
     #[test]
-    fn the_default_follows_as_the_step_does() {
+    fn the_default_rule_for_following_equals_that_of_the_step() {
         assert_eq!(follow(Follow::default()), pipeline::Follow::default());
     }
 
     #[test]
-    fn the_papers_rule_is_the_median_alone() {
+    fn the_rule_of_the_paper_uses_only_the_median() {
         let px = |name| tau_px(&Tau::Named(name));
         assert_eq!(
             px(TauName::HumanEvaMedian),

@@ -18,12 +18,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_those_of_the_step() {
+    fn the_defaults_equal_those_of_the_step() {
         assert_eq!(settings(&Config::default()), ViewSettings::default());
     }
 
     #[test]
-    fn the_tracked_search_is_that_of_the_filters() {
+    fn the_tracked_search_has_the_default_settings_of_the_filters() {
         let config: Config = toml::from_str("search = \"tracked\"").unwrap();
         assert_eq!(settings(&config).track, Some(TrackSettings::default()));
     }

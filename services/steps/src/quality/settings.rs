@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_are_counted_as_the_file_says() {
+    fn frames_are_numbered_as_in_the_prediction_file() {
         let table = ErrorTable {
             table: "t.csv".into(),
             subject: None,

@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_defaults_are_those_of_the_step() {
+    fn the_defaults_equal_those_of_the_step() {
         let step = SkeletonSettings::default();
         assert_eq!(combine(paper::Config::default().combine), step.combine);
         assert_eq!(person::Config::default().joints, step.joints.name);

@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn the_run_with_a_killed_camera_is_the_last() {
+    fn the_run_with_a_killed_camera_comes_last() {
         assert_eq!(
             names(Kind::Scale, 3),
             ["1 view", "2 views", "3 views", "3 views, one camera killed"]

@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missed_limit_is_shown_and_the_report_is_not_held() {
+    fn a_missed_limit_is_shown_and_the_report_counts_as_failed() {
         for (got, held, word) in [(1.5, true, "held  "), (2.5, false, "MISSED")] {
             let report = report(got);
             assert_eq!(report.is_held(), held);

@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_is_that_from_the_first_to_the_last_result() {
+    fn the_rate_is_measured_from_the_first_to_the_last_result() {
         let results = [0.0, 100.0, 250.0, 400.0].map(|value| moment(value, value + 30.0));
         assert_eq!(rate_hz(&results), Some(7.5));
         assert_eq!(rate_hz(&results[..1]), None);
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn percentiles_are_converted_one_to_one() {
+    fn percentiles_are_converted_without_change() {
         let written = Percentiles {
             count: 3,
             max_ms: 4.0,

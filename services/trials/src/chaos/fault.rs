@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_is_a_valid_setting() {
+    fn every_fault_is_accepted_as_a_setting() {
         for it in CameraFault::ALL {
             let faults: deployment::capture::Faults = it.setting([40, 60]).parse().unwrap();
             assert!(faults.at(39).is_none() && faults.at(40).is_some(), "{it:?}");

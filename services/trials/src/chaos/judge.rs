@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn every_limit_of_a_process_fault_can_be_missed_alone() {
+    fn each_limit_of_a_process_fault_can_be_missed_separately() {
         type Change = fn(&mut Cost, &mut RunOutcome);
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 11] = [
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn without_an_injected_fault_the_limits_are_missed() {
+    fn limits_are_missed_if_no_fault_was_injected() {
         let got = missed_once(ProcessFault::Kill, "pose-1", |cost, _| {
             *cost = Cost::default();
         });
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pause_may_last_as_long_as_triangulate_is_away() {
+    fn the_pause_without_results_is_allowed_to_last_as_long_as_triangulate_is_absent() {
         let pause = |cost: &mut Cost, _: &mut RunOutcome| cost.longest_pause_ms = Some(2500.0);
         assert_eq!(
             missed_once(ProcessFault::Kill, "triangulate", pause),
@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn every_limit_of_random_kills_can_be_missed_alone() {
+    fn each_limit_of_random_kills_can_be_missed_separately() {
         type Change = fn(&mut RandomKillsOutcome, &mut ResourceUse);
         let nothing: &[&str] = &[];
         let changes: [(Change, &[&str]); 8] = [

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_is_killed_every_period_unless_it_is_away() {
+    fn a_process_is_killed_every_period_unless_it_is_restarting() {
         let mut random_kills = after_first_result();
         assert_eq!(health_at(&mut random_kills, "pose-0", 0, 1, 2099), None);
         let first = health_at(&mut random_kills, "pose-0", 0, 1, 2100).unwrap();

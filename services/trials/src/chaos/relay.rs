@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_passes_a_cut_cable_and_all_of_it_afterwards() {
+    fn a_cut_link_delivers_nothing_until_it_is_restored_and_then_everything() {
         let server = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let relay = Relay::to(server.local_addr().unwrap().port()).unwrap();
         let mut client = TcpStream::connect(("127.0.0.1", relay.port())).unwrap();

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_compared_at_equal_ages() {
+    fn memory_is_compared_at_equal_process_ages() {
         // The process is killed often at first, but not at the end. Its memory depends only on its age.
         let young = [(1, 50), (5, 60), (1, 50), (2, 55)].map(|(age, memory)| sample(age, memory));
         let old = [(5, 60), (20, 120), (100, 180)].map(|(age, memory)| sample(age, memory));
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_sample_does_not_change_start_and_end() {
+    fn a_single_sample_does_not_affect_start_and_end_values() {
         let mut monitor = ResourceMonitor::default();
         start(&mut monitor, "a", 0);
         for seconds in [1, 2, 3, 4, 5, 6, 7, 8] {
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn this_process_uses_resources() {
+    fn resource_use_of_this_process_is_measured() {
         let namespace = Namespace::below("nobody", &std::env::temp_dir().join("px-none")).unwrap();
         let sample = measure(&namespace, &[std::process::id()]).used;
         assert!(sample.memory_bytes > 100_000, "{sample:?}");

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn results_kills_and_samples_count_in_their_part() {
+    fn results_and_kills_and_samples_count_in_their_section_of_the_run() {
         let results = [moment(1.0, 1.2), moment(9.9, 10.4), moment(24.0, 24.3)];
         let kills = [kill(3), kill(12), kill(14)];
         let parts = parts(10 * SECOND, SESSION, &kills, &monitor(&[2, 13]), &results);
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_of_one_part_has_no_table_and_others_have_a_line_per_part() {
+    fn a_run_with_one_section_has_no_table_and_others_have_a_row_per_section() {
         let results = [moment(1.0, 1.2), moment(24.0, 24.3)];
         let monitor = monitor(&[2]);
         let of = |seconds: u64| parts(seconds * SECOND, SESSION, &[], &monitor, &results);

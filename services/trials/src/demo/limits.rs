@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn every_limit_can_be_missed_alone() {
+    fn each_limit_of_the_demo_can_be_missed_separately() {
         type Change = fn(&mut Run);
         let changes: [(Change, &str); 10] = [
             (|run| run.n_results = [9, 9], "frames with a result, %"),
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn no_results_are_needed_meanwhile_if_the_camera_is_back_at_once() {
+    fn no_results_are_required_during_the_absence_if_the_camera_is_back_at_once() {
         let back = |ms: f64| {
             move |run: &mut Run| {
                 if let Some(cost) = &mut run.cost {

@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn few_overlays_give_few_strips_without_repetitions() {
+    fn few_overlays_give_few_strips_without_duplicates() {
         assert_eq!(frames(&[], Some(40)), [0; 0]);
         assert_eq!(frames(&[(4, true)], Some(40)), [4]);
         assert_eq!(frames(&[(0, true), (4, true), (8, true)], None), [0, 4, 8]);

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_no_results_meanwhile_if_the_others_wait() {
+    fn there_are_no_results_during_the_absence_if_the_other_views_wait() {
         let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 200.0, Some(0)),
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn every_process_is_back_with_its_own_message() {
+    fn each_process_counts_as_back_after_its_own_message() {
         let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 300.0, Some(0)),
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_does_not_come_back_is_away_to_the_end() {
+    fn a_process_that_is_not_restarted_counts_as_absent_to_the_end() {
         let results = [
             moment(0, 100.0, Some(0)),
             moment(1, 400.0, None),

@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn the_trigger_of_an_endless_loop_is_the_process_itself() {
+    fn an_endless_loop_is_triggered_by_the_process_itself() {
         let mut injector = Injector::new(ProcessFault::Spin, "capture-1", 3.0);
         handle_at(&mut injector, &started("capture-1", 70, 0), 1);
         for (process, frame, expected) in [
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_works_once_it_has_sent_and_results_once_it_has_received() {
+    fn a_process_counts_as_working_after_its_first_message() {
         let received = Health {
             n_received: 4,
             ..health(1, 0, 0)

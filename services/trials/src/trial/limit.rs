@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_limit_itself_holds_and_an_unmeasured_number_does_not() {
+    fn a_value_equal_to_the_limit_passes_and_a_missing_value_fails() {
         for (got, least, most) in [
             (Some(2.0), true, true),
             (Some(2.5), true, false),
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_that_should_be_empty_is_shown() {
+    fn entries_of_a_list_that_should_be_empty_are_shown() {
         assert!(none_of("x", &[]).held);
         let got = none_of("x", &["a".to_owned(), "b".to_owned()]);
         assert_eq!((got.held, got.got.as_str()), (false, "a, b"));

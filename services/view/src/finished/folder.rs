@@ -331,7 +331,7 @@ mod tests {
     use crate::moment::tests::scene;
 
     #[test]
-    fn of_several_people_the_one_who_is_followed_is_shown_first() {
+    fn the_followed_person_is_shown_first() {
         let person = |id: u64| {
             format!(
                 r#"{{"facing_margin":null,"id":{id},"joints":{{"head":{{"covariance_m2":[1,0,0,1,0,1],"position_m":[{id},2,3],"reprojection_px":1,"views":["a"]}}}},"pairs":1,"stature_m":1.7,"status":"ok","views_used":["a"]}}"#

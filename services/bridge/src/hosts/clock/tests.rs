@@ -66,7 +66,7 @@ fn other(there: f64, back: f64, noise: f64, drift_ppm: f64) -> Other {
 }
 
 #[test]
-fn a_quiet_network_gives_the_offset_within_microseconds_and_the_drift() {
+fn on_an_idle_network_the_offset_is_accurate_to_microseconds_and_the_drift_is_found() {
     let (got, truth) = after(60, &mut other(0.1, 0.1, 0.0, 40.0));
     let off = got.offset_nanos - truth;
     assert!(off.abs() < 3_000, "{off} ns");
@@ -80,7 +80,7 @@ fn a_quiet_network_gives_the_offset_within_microseconds_and_the_drift() {
 }
 
 #[test]
-fn noise_is_filtered_by_the_shortest_round_trips() {
+fn the_shortest_round_trips_filter_out_noise() {
     let (got, truth) = after(60, &mut other(0.1, 0.1, 5.0, 20.0));
     let off = (got.offset_nanos - truth).abs();
     // The mean of all exchanges would be wrong by a few milliseconds divided by the square root of 60. A single exchange could be wrong by
@@ -90,7 +90,7 @@ fn noise_is_filtered_by_the_shortest_round_trips() {
 }
 
 #[test]
-fn ways_of_different_lengths_cannot_be_seen_and_are_within_the_bound() {
+fn the_error_from_asymmetric_delays_stays_within_the_bound() {
     let (got, truth) = after(60, &mut other(8.0, 1.0, 0.0, 0.0));
     let off = got.offset_nanos - truth;
     assert!(
@@ -102,7 +102,7 @@ fn ways_of_different_lengths_cannot_be_seen_and_are_within_the_bound() {
 }
 
 #[test]
-fn the_bound_grows_while_nothing_is_heard() {
+fn the_bound_grows_while_no_answer_arrives() {
     let mut other = other(0.1, 0.1, 0.0, 30.0);
     let mut clock = Clock::default();
     for nth in 0..60 {
@@ -118,7 +118,7 @@ fn the_bound_grows_while_nothing_is_heard() {
 }
 
 #[test]
-fn a_clock_that_was_set_is_noticed_after_three_exchanges() {
+fn a_clock_that_is_set_is_detected_after_three_exchanges() {
     let mut other = other(0.1, 0.1, 0.0, 0.0);
     let mut clock = Clock::default();
     for nth in 0..20 {
@@ -136,7 +136,7 @@ fn a_clock_that_was_set_is_noticed_after_three_exchanges() {
 }
 
 #[test]
-fn times_that_cannot_be_are_refused() {
+fn impossible_times_are_refused() {
     let good = Exchange {
         asked_at: 100,
         received_at: 900,
@@ -172,7 +172,7 @@ fn times_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_bound_beyond_its_share_is_warned_of_with_what_helps() {
+fn a_bound_above_the_limit_gives_a_warning_with_advice() {
     let (got, _) = after(10, &mut other(8.0, 8.0, 0.0, 0.0));
     assert_eq!(got.warning(200_000_000, 0.1), None, "8 of 200 ms");
     let text = got.warning(33_000_000, 0.1).unwrap();
@@ -184,7 +184,7 @@ fn a_bound_beyond_its_share_is_warned_of_with_what_helps() {
 }
 
 #[test]
-fn times_translate_there_and_back() {
+fn converting_a_time_forth_and_back_gives_the_same_time() {
     let (got, _) = after(10, &mut other(0.1, 0.1, 0.0, 0.0));
     assert_eq!(got.ours(got.theirs(1234)), 1234);
     assert_eq!(got.ours(0), 0, "before our clock began");
@@ -192,7 +192,7 @@ fn times_translate_there_and_back() {
 
 /// Three exchanges over six seconds, for which the fitted line is far from the line through the first and the last exchange.
 #[test]
-fn a_line_that_leaves_its_ends_has_a_bound_that_says_so() {
+fn the_bound_covers_the_error_of_a_line_fitted_outside_its_samples() {
     let random = Rng::with_seed(10_865_627_331_665_547_518);
     let mut other = Other {
         random,
@@ -210,7 +210,7 @@ fn a_line_that_leaves_its_ends_has_a_bound_that_says_so() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4096))]
     #[test]
-    fn the_truth_is_within_the_bound(
+    fn the_true_offset_is_within_the_bound(
         there in 0.01..20.0,
         back in 0.01..20.0,
         noise in 0.0..10.0,
@@ -225,7 +225,7 @@ proptest! {
     }
 
     #[test]
-    fn any_times_are_taken_or_refused(times: [u64; 4], now: u64) {
+    fn any_times_are_accepted_or_refused_without_panic(times: [u64; 4], now: u64) {
         let [asked_at, received_at, answered_at, heard_at] = times;
         let mut clock = Clock::default();
         let _taken = clock.add(Exchange { asked_at, received_at, answered_at, heard_at }).is_ok();

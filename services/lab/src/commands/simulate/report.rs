@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn costs_are_those_of_a_frame_of_a_view() {
+    fn costs_are_per_frame_and_view() {
         let got = of_run(&report(), None).unwrap();
         let off = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn the_link_is_that_of_the_views_that_came() {
+    fn link_costs_are_computed_from_the_views_that_arrived() {
         let view = |used: u32| {
             json!({ "used": used, "bytes": 2000, "encode": { "p50_ms": 1.5 },
             "network": { "p50_ms": 0.25 }, "decode": { "p50_ms": 0.5 } })
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_report_is_refused() {
+    fn files_that_are_not_a_report_are_refused() {
         let refused = |change: &dyn Fn(&mut Value)| {
             let mut it = report();
             change(&mut it);

@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_range_of_frames_is_two_numbers() {
+    fn a_range_of_frames_is_parsed_from_two_numbers() {
         assert_eq!(frames("1-600"), Ok([1, 600]));
         for text in ["", "5", "5-", "-5", "a-b"] {
             assert!(frames(text).is_err(), "{text}");

@@ -11,7 +11,7 @@ use super::*;
 use exports::report::html::STYLE;
 
 #[test]
-fn the_page_is_self_contained_with_every_table_and_figure() {
+fn the_page_is_self_contained_and_has_every_table_and_figure() {
     let (summary, versions) = made_up();
     let about = [("model".to_owned(), "a <b> & c".to_owned())];
     let page = html(&Page {
@@ -69,7 +69,7 @@ fn no_name_of_a_sequence_or_a_part_becomes_markup() {
 }
 
 #[test]
-fn what_stands_beside_an_axis_is_what_it_means() {
+fn axis_labels_show_their_values() {
     for (value, text) in [
         (0.75, "0.75"),
         (2.25, "2.25"),
@@ -95,7 +95,7 @@ fn what_stands_beside_an_axis_is_what_it_means() {
 }
 
 #[test]
-fn the_page_has_the_style_of_a_run_and_fits_a_telephone() {
+fn the_page_uses_the_style_of_run_reports_and_fits_a_telephone_screen() {
     let (summary, versions) = made_up();
     let about = [(
         "sequences".to_owned(),
@@ -115,7 +115,7 @@ fn the_page_has_the_style_of_a_run_and_fits_a_telephone() {
 }
 
 #[test]
-fn the_page_of_pictures_says_every_number_and_escapes_names() {
+fn the_page_for_single_pictures_shows_every_number_and_escapes_names() {
     let person =
         |x: f64| core::array::from_fn(|i| [x + 10.0 * (i % 4) as f64, 25.0 * (i / 4) as f64]);
     let (here, there) = (Some(person(0.0)), Some(person(500.0)));

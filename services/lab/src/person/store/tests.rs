@@ -99,7 +99,7 @@ fn a_model_is_written_by_one_training_at_a_time() {
 }
 
 #[test]
-fn what_was_written_goes_on_as_if_nothing_had_been() {
+fn a_training_that_continues_from_a_checkpoint_has_identical_bytes() {
     let (plan, settings) = plan();
     let bytes = bytes_of(&plan, &settings);
     let (checkpoint, stamp) = Checkpoint::from_bytes(&bytes).unwrap();
@@ -110,7 +110,7 @@ fn what_was_written_goes_on_as_if_nothing_had_been() {
 }
 
 #[test]
-fn no_cut_and_no_changed_byte_is_accepted() {
+fn no_truncated_or_changed_file_is_accepted() {
     let (plan, settings) = plan();
     let bytes = bytes_of(&plan, &settings);
     for length in (0..bytes.len()).step_by(7) {
@@ -146,7 +146,7 @@ proptest! {
 
     /// Tests damage to poses, shares and counts with a correct checksum.
     #[test]
-    fn damage_is_an_error_or_another_training_but_no_panic(
+    fn a_damaged_checkpoint_never_panics(
         all in prop::collection::vec(
             prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
             40,

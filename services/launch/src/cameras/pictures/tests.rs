@@ -37,7 +37,7 @@ fn turns(rig: Rig, stored: [usize; 2], degrees: u32) -> bool {
 }
 
 #[test]
-fn the_calibration_tells_whether_a_tag_is_to_be_followed() {
+fn the_calibration_decides_whether_the_orientation_tag_is_applied() {
     let up = Some(Vector3::z_axis());
     for degrees in [90, 270] {
         assert!(turns(rig([480, 640], 0.0, up), [640, 480], degrees));
@@ -54,7 +54,7 @@ fn the_calibration_tells_whether_a_tag_is_to_be_followed() {
 }
 
 #[test]
-fn gaps_are_named_by_frames() {
+fn gaps_are_described_by_their_frames() {
     let counted = PictureNumbers { first: 10, step: 5 };
     assert_eq!(gaps(&[10, 15, 20], counted), None);
     let text = gaps(&[15, 20, 30, 55], counted).unwrap();

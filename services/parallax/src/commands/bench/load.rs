@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_number_of_cameras_is_limited_to_that_of_a_deployment() {
+    fn the_number_of_cameras_is_limited_to_the_maximum_of_a_deployment() {
         assert_eq!(views("16"), Ok(16));
         for wrong in ["0", "17", "-1", "four"] {
             views(wrong).unwrap_err();

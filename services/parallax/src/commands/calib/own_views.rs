@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_views_found_alone_agrees_with_their_rig_and_names_two_that_are_exchanged() {
+    fn poses_of_single_views_confirm_a_correct_rig_and_reveal_two_swapped_cameras() {
         let folder = tempfile::tempdir().unwrap();
         let rig = rig();
         let file = folder.path().join("pose2d.jsonl");

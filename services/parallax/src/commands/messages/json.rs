@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn statuses_are_all_there_and_have_different_names() {
+    fn every_status_is_listed_with_a_unique_name() {
         let names: Vec<&str> = statuses().map(Status::reason).collect();
         assert_eq!(names.len(), 18);
         assert_eq!(names[1], "end of footage");
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn the_layouts_of_python_are_those_of_the_messages() {
+    fn the_python_layouts_equal_the_message_layouts() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let text = fs::read_to_string(root.join("python/parallax_client/messages.json"));
         assert!(

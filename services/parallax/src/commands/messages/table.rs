@@ -256,7 +256,7 @@ mod tests {
     ];
 
     #[test]
-    fn names_are_those_of_the_transport() {
+    fn type_names_equal_those_of_the_transport() {
         for layout in layouts() {
             let head = format!("pub struct {} {{\n", layout.name);
             let mut sources = SOURCES.iter();

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn names_do_not_command_the_terminal() {
+    fn control_characters_in_names_do_not_reach_the_terminal() {
         let (lines, _) = drawn("a\x1b[2Jb\x07\n", 0, [20, 2]);
         assert_eq!(lines[0], "a[2Jb");
     }

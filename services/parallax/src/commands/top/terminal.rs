@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_have_the_actions_in_the_help() {
+    fn every_key_in_the_help_has_its_action() {
         let rows: [(&[u8], &[Key]); 12] = [
             (b" ", &[Key::NextPage]),
             (b"j", &[Key::NextPage]),
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_without_an_action_are_passed_over_completely() {
+    fn the_whole_sequence_of_an_unused_key_is_ignored() {
         // The keys Home, F5, Ctrl+Right, Alt+Q, the letter a, an umlaut, and a truncated sequence.
         for bytes in [
             &b"\x1b[H"[..],
