@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn three_points_on_the_floor_put_the_rig_on_it_in_any_order() {
+    fn three_points_on_the_floor_in_any_order_define_the_floor_of_the_rig() {
         let (truth, moved) = moved();
         for other in [[0.2, 1.0], [0.5, -1.2]] {
             let points = [[0.0, 0.0], [1.0, 0.0], other];
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_on_the_floor_puts_the_rig_on_it() {
+    fn a_board_on_the_floor_defines_the_floor_of_the_rig() {
         let (truth, moved) = moved();
         let board: Vec<Point2<f64>> = (0..20)
             .map(|nth| Point2::new(0.1 * f64::from(nth % 5), 0.1 * f64::from(nth / 5)))

@@ -120,7 +120,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_message_of_another_run_or_view_is_none_of_ours() {
+    fn messages_of_another_run_or_view_are_rejected() {
         let mut it = skeletons(3).stamp;
         assert!(stamp(&it, &running(), 0));
         assert!(!stamp(&it, &running(), 1));
@@ -129,7 +129,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn counts_and_numbers_that_cannot_be_are_refused() {
+    fn impossible_counts_and_numbers_are_refused() {
         let running = running();
         assert!(super::skeletons(&skeletons(0), &running));
         let none = Skeletons {
@@ -175,7 +175,7 @@ pub(crate) mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_taken_or_refused(bytes in prop::collection::vec(any::<u8>(), size_of::<Skeletons>())) {
+        fn any_bytes_are_accepted_or_refused_without_panic(bytes in prop::collection::vec(any::<u8>(), size_of::<Skeletons>())) {
             let message: Skeletons = bytemuck::pod_read_unaligned(&bytes);
             super::skeletons(&message, &running());
             let n = size_of::<ViewPose>().min(bytes.len());

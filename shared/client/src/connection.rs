@@ -250,7 +250,7 @@ mod tests {
     use crate::check::tests::running;
 
     #[test]
-    fn cameras_are_found_by_name_and_those_that_are_not_there_are_told() {
+    fn cameras_are_found_by_name_and_missing_ones_are_named() {
         let of = |names: &[&str]| numbers(&running(), &Wish::views().of_cameras(names));
         assert_eq!(of(&["right", "left", "right"]).unwrap(), [0, 1]);
         assert_eq!(numbers(&running(), &Wish::views()).unwrap(), [0, 1]);

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_skeleton_says_that_the_frame_is_over() {
+    fn a_skeleton_completes_its_frame() {
         let now = Instant::now();
         let mut joiner = Joiner::new(Wish::skeletons().with_poses().with_pictures(), 2);
         for frame in [4, 5] {
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn without_skeletons_a_frame_waits_for_its_views_and_not_for_ever() {
+    fn without_skeletons_a_frame_waits_a_limited_time_for_its_views() {
         let now = Instant::now();
         let mut joiner = Joiner::<()>::new(Wish::views().with_poses(), 2);
         joiner.add_pose(0, pose(1), now);
@@ -234,7 +234,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn frames_come_once_in_order_and_what_waits_is_bounded(
+        fn frames_are_returned_once_in_order_and_the_queue_is_bounded(
             parts in prop::collection::vec((0_u64..200, 0_usize..3), 1..400),
             with_skeletons in any::<bool>(),
         ) {

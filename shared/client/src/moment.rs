@@ -275,7 +275,7 @@ mod tests {
     use crate::check::tests::{running, skeletons};
 
     #[test]
-    fn a_joint_has_a_place_or_a_reason() {
+    fn a_joint_has_a_position_or_a_reason() {
         let mut message = Box::new(skeletons(0));
         message.people[1] = message.people[0];
         (message.n_people, message.people[1].id) = (2, 5);

@@ -170,7 +170,7 @@ mod tests {
                         [[camera]]\nsource = 'b.mp4'\nname = 'b'\noffset_ms = 7 # old\n";
 
     #[test]
-    fn clocks_are_written_and_everything_else_stays() {
+    fn offsets_are_written_and_the_rest_of_the_file_is_unchanged() {
         let clocks = [clock("a", -12.34, Some(50.0)), clock("b", 0.0, None)];
         let changed = with_clocks(TEXT, &clocks).unwrap();
         let expected = TEXT
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_end_as_in_windows_do_so_afterwards() {
+    fn windows_line_endings_are_kept() {
         let text = "[[camera]]\r\nname = 'a'\r\nsource = 'x'\r\n";
         let changed = with_clocks(text, &[clock("a", 3.0, None)]).unwrap();
         assert_eq!(
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_refused() {
+    fn invalid_syntax_and_missing_cameras_are_refused() {
         let refused = |text: &str| with_clocks(text, &[clock("z", 3.0, None)]).unwrap_err();
         assert_eq!(refused("a = ["), ClocksError::Syntax);
         assert!(matches!(refused(TEXT), ClocksError::NoCamera { .. }));

@@ -110,14 +110,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slip_gets_the_nearest_name() {
+    fn a_misspelt_name_gets_the_nearest_name_as_suggestion() {
         let message = "unknown field `modle`, expected one of `name`, `model`, `rig`";
         let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
         assert_eq!(got, "a.toml:3: unknown key `modle`: did you mean `model`?");
     }
 
     #[test]
-    fn no_word_of_the_program_is_left_of_what_its_types_say() {
+    fn messages_about_types_contain_no_rust_terms() {
         #[derive(Debug, serde::Deserialize)]
         #[expect(dead_code, reason = "only read")]
         struct All {
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_like_no_other_gets_the_list() {
+    fn a_name_without_a_similar_one_gets_the_list_of_names() {
         let message = "unknown field `quux`, expected `name` or `rig`";
         let got = ConfigError::explain("a.toml:3".to_owned(), message, None).to_string();
         assert_eq!(

@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_key_takes_the_place_of_another() {
+    fn the_number_of_settings_is_limited() {
         let n = keys().len() + camera_keys().len() + host_keys().len();
         assert!(n <= 85, "{n} keys: which can go?");
     }
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_in_the_order_of_their_sections() {
+    fn keys_are_listed_in_the_order_of_their_sections() {
         let names: Vec<String> = keys().into_iter().map(|key| key.name).collect();
         assert_eq!(names[..3], ["name", "rig", "unit"]);
         assert_eq!(names.last().unwrap(), "runtime.lock_memory");

@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_live_camera_makes_a_run_one_in_real_time() {
+    fn a_live_camera_makes_the_run_realtime() {
         let it = read(["", "", ""]).unwrap();
         assert_eq!(it.capture.mode, Mode::Realtime);
         assert_eq!(it.deadline_ms(), 200);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_live_camera_cannot_do_is_refused_with_the_reason() {
+    fn settings_that_a_live_camera_does_not_support_are_refused_with_the_reason() {
         for (text, words) in [
             (["[capture]\nmode = 'lossless'", "", ""], "never lossless"),
             (["[capture]\nmode = 'paced'", "", ""], "\"b\" is live"),
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn controls_are_numbers_by_name() {
+    fn camera_controls_are_numbers_with_a_name() {
         let it = read(["", "controls = { gain = 3, focus_absolute = 0 }", ""]).unwrap();
         assert_eq!(it.cameras[0].controls["gain"], 3);
         let refused = read(["", "controls = { gain = 'high' }", ""]).unwrap_err();

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn the_network_is_the_method_where_nothing_is_said() {
+    fn the_default_method_is_the_network() {
         let deployment = read("", "", &[]).unwrap();
         assert_eq!(deployment.method, Method::Network);
         assert_eq!(deployment.views(), Views::Space);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_but_its_key_changes_the_method() {
+    fn no_other_key_changes_the_method() {
         for section in [
             "network = 'b.onnx'\n",
             "keypoints = 'b.json'\n",

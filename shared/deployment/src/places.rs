@@ -95,7 +95,7 @@ mod tests {
                         [capture]\nscale = 5\nof = [1, 22]\n[paper.tau]\nfile = 3\n";
 
     #[test]
-    fn a_value_is_called_by_its_whole_key_wherever_it_stands() {
+    fn errors_name_the_full_key_of_a_value() {
         for (value, key) in [
             ("'a'", "name"),
             ("1 }", "size.w"),

@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_schema_refuses_unknown_keys_and_asks_for_what_a_file_needs() {
+    fn the_schema_refuses_unknown_keys_and_requires_the_necessary_ones() {
         let schema = schema();
         assert_eq!(schema["additionalProperties"], false);
         let mut required: Vec<&str> = schema["required"]
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_of_a_range_are_taken_and_what_is_beyond_is_refused() {
+    fn the_ends_of_a_range_are_accepted_and_values_beyond_are_refused() {
         let read = |key: &str, value: f64| {
             let mut text = "name = 'two'\nrig = 'rig.toml'\noutput = 'out'\n\
                             [[camera]]\nname = 'a'\nsource = 'a.mp4'\n"
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_key_takes_is_told_in_words() {
+    fn the_accepted_values_of_a_key_are_described_in_words() {
         let keys = crate::keys();
         let takes = |name: &str| keys.iter().find(|key| key.name == name).unwrap().takes.clone();
         assert_eq!(takes("paper.workers"), "whole number");

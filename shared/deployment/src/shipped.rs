@@ -31,7 +31,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_word_alone_is_built_in_and_a_path_is_a_path() {
+    fn the_word_alone_selects_the_included_file_and_a_path_selects_a_file() {
         let base = Path::new("/room");
         assert_eq!(relative_to(Path::new(SHIPPED), base), Path::new(SHIPPED));
         for (named, file) in [

@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn usual_slips_are_told() {
+    fn common_mistakes_are_explained() {
         assert_eq!(of_line(r#"source = "C:\Users\me\a.mp4""#), Some(ESCAPE));
         assert!(of_line("up = [0 0 1]").is_some());
         for fine in [
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_others_are_told() {
+    fn files_of_other_programs_are_recognised() {
         let pose2sim =
             "[project]\nmulti_person = false\n[pose]\n[synchronization]\n[triangulation]\n";
         assert!(other_file(pose2sim).is_some_and(|hint| hint.contains("Pose2Sim")));

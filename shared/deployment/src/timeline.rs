@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_in_step_keep_their_frames() {
+    fn synchronised_cameras_keep_their_frames() {
         for it in Timeline::all(&[clock(30.0, 0.0, 0.0), clock(30.0, 0.0, 0.0)]) {
             for instant in [0, 1, 29, 100_000] {
                 assert_eq!((it.frame(instant), it.rest_nanos(instant)), (instant, 0));
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn the_camera_that_was_started_first_leaves_out_its_beginning() {
+    fn the_camera_that_started_first_skips_its_first_frames() {
         // The second camera started 0.34 s after the first: 10.2 frames.
         let all = Timeline::all(&[clock(30.0, 0.0, 0.0), clock(30.0, 0.34, 0.0)]);
         let [first, second] = [all[0], all[1]];
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_is_the_nearest_one_also_with_drift_and_other_rates() {
+    fn every_instant_gets_the_nearest_frame_even_with_drift_and_different_rates() {
         let clocks = [
             clock(25.0, 0.0, 0.0),
             clock(30.0, -1.234, 2e-4),

@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn everybody_is_drawn_and_the_status_is_that_of_whoever_is_there() {
+    fn everybody_is_drawn_with_the_status_of_the_people_found() {
         let mut pair = [walker(2), walker(2)];
         pair[1].ids = vec![7];
         for point in pair[1].slots[0].points.iter_mut().flatten() {
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_covariance_has_no_ellipse_and_an_endless_one_does_no_harm() {
+    fn an_unknown_covariance_has_no_ellipse_and_an_infinite_one_is_tolerated() {
         let mut trial = walker(1);
         let with = drawn(&trial, 0);
         for point in trial.slots[0].points.iter_mut().flatten() {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_are_told_by_the_names_of_all_sets() {
+    fn sides_are_recognised_from_the_joint_names_of_all_sets() {
         for (name, side) in [
             ("right knee", Side::Right),
             ("left heel", Side::Left),

@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn opensim_names_are_those_of_the_marker_set() {
+    fn opensim_names_equal_those_of_the_marker_set() {
         // These are the names of Markers_Halpe26.xml of Pose2Sim 0.10, which does not have eyes and ears.
         let due = [
             "Nose",
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_of_every_set_keep_different_names() {
+    fn joints_of_every_set_have_different_opensim_names() {
         for set in JointSet::ALL {
             let names = set.joints.iter().map(|joint| Naming::OpenSim.apply(joint.name));
             let names: Vec<String> = names.collect();

@@ -94,7 +94,7 @@ mod tests {
     use crate::testing::{camera, walker};
 
     #[test]
-    fn what_was_written_is_read_by_our_reader_where_the_camera_sees_it() {
+    fn written_keypoints_are_read_back_at_their_pixels() {
         let (trial, view) = (walker(3), camera());
         let text = frame(core::slice::from_ref(&trial), 1, &view);
         let read = openpose::parse(text.as_bytes(), None).unwrap().people;
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn of_several_people_each_who_is_seen_has_the_own_number() {
+    fn each_visible_person_has_their_own_index() {
         let view = camera();
         let [one, mut other] = [walker(3), walker(3)];
         other.ids = vec![7];
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_nobody_and_a_missing_joint_zeros() {
+    fn a_gap_has_no_people_and_a_missing_joint_is_zeros() {
         let (mut trial, view) = (walker(3), camera());
         trial.slots[0].points.clear();
         assert!(frame(core::slice::from_ref(&trial), 0, &view).contains("\"people\":[]"));

@@ -150,7 +150,7 @@ mod tests {
     use crate::testing::walker;
 
     #[test]
-    fn what_was_written_is_read_back() {
+    fn written_data_is_read_back() {
         let mut trial = walker(3);
         trial.slots[1].points[4] = Err(Gap("implausible".into()));
         let mut file = Vec::new();

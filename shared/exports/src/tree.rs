@@ -241,7 +241,7 @@ mod tests {
     use crate::testing::walker;
 
     #[test]
-    fn parents_come_before_children_and_aims_are_children() {
+    fn parents_come_before_children_and_a_bone_points_to_a_child() {
         for (index, node) in NODES.iter().enumerate() {
             assert!(node.parent.is_none_or(|parent| parent < index));
             assert_eq!(node.landmark.is_none(), node.rest == [0.0; 3] && index > 0);
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tree_lies_where_its_landmarks_were_seen() {
+    fn nodes_of_the_tree_are_at_the_measured_landmarks() {
         let trial = walker(40);
         let mut poser = Poser::new(&trial, &lengths(&trial));
         for slot in 0..trial.slots.len() {
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn opposite_directions_are_half_a_turn() {
+    fn opposite_directions_give_a_rotation_by_half_a_turn() {
         for from in [Vector3::x(), Vector3::y(), Vector3::z()] {
             assert!((arc(&from, &-from) * from + from).norm() < 1e-12);
         }

@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_has_a_status_of_its_own() {
+    fn every_kind_of_failure_has_its_own_exit_code() {
         for kind in ExitKind::ALL {
             assert_eq!(ExitKind::of_status(i32::from(kind.status())), Some(kind));
         }
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_of_the_input_are_permanent() {
+    fn input_errors_are_permanent() {
         let permanent = ExitKind::ALL.map(|kind| (kind.status(), kind.is_permanent()));
         let statuses = permanent
             .iter()

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_does_not_notice_is_left_behind() {
+    fn work_that_ignores_an_interrupt_is_abandoned() {
         let stop = Stop::new().unwrap();
         stop.request();
         let (_held, never) = sync_channel::<()>(1);

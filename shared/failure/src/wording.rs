@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn types_are_described_in_terms_of_users() {
+    fn types_are_described_in_words_for_users() {
         check(
             "invalid value: integer `-1`, expected u64",
             "expected a whole number of at least 0, found -1",

@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_is_refused_with_its_owner_and_what_it_leads_to_stays() {
+    fn a_link_is_refused_with_its_owner_and_its_target_is_kept() {
         let (_base, folder, secret) = room();
         symlink(&secret, folder.path().join("pose3d.jsonl.part")).unwrap();
         let own = user(geteuid().as_raw());
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_name_of_another_file_is_replaced_and_never_written_through() {
+    fn a_hard_link_is_replaced_and_its_target_is_never_written() {
         let (_base, folder, secret) = room();
         fs::hard_link(&secret, folder.path().join("a.part")).unwrap();
         let error = folder.resume("a.part").unwrap_err().to_string();
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_left_is_begun_anew_or_gone_on_with() {
+    fn files_of_a_killed_process_are_restarted_or_continued() {
         let (_base, folder, _) = room();
         let path = folder.path().join("a.part");
         folder.begin("a.part").unwrap().write_all(b"one").unwrap();
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_put_in_the_place_of_an_open_folder_is_not_written_to() {
+    fn a_folder_that_replaces_an_open_one_is_not_written_to() {
         let (base, folder, _) = room();
         let moved = base.path().join("moved");
         fs::rename(folder.path(), &moved).unwrap();
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_everybody_may_write_to_is_a_risk_unless_it_is_sticky() {
+    fn a_world_writable_folder_is_a_risk_unless_it_is_sticky() {
         let (_base, folder, _) = room();
         let risk = |mode| {
             fs::set_permissions(folder.path(), Permissions::from_mode(mode)).unwrap();

@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_made_and_replaced_with_nothing_left_beside_it() {
+    fn a_file_is_created_and_replaced_without_leftovers() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.plx");
         for (write, text) in [
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_bit_by_bit_is_whole_or_not_there() {
+    fn a_file_written_in_steps_is_complete_or_absent() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("long.csv");
         let failed = replace_by(&path, |out| {
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn where_it_cannot_be_put_into_its_place_nothing_is_left() {
+    fn a_failed_replacement_leaves_no_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("taken");
         fs::create_dir_all(path.join("by a folder")).unwrap();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_under_the_name_of_the_file_or_of_what_lies_beside_it_is_not_followed() {
+    fn links_at_the_path_of_the_file_or_its_temporary_file_are_not_followed() {
         let folder = tempfile::tempdir().unwrap();
         let secret = folder.path().join("secret");
         fs::write(&secret, "kept").unwrap();

@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn users_have_names_where_the_system_knows_them() {
+    fn known_users_have_names() {
         assert_eq!(user(0), "user root (0)");
         assert_eq!(user(4_000_000_000), "user 4000000000");
     }

@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn every_format_is_recognised_by_its_beginning() {
+    fn every_format_is_recognised_by_its_first_bytes() {
         let spec = planted::three_parts();
         let text = planted::as_text(&spec);
         assert_eq!(outcome("he.dat", text.as_bytes()), "fine: he");
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_rejected_by_name() {
+    fn other_files_are_rejected_with_the_file_name() {
         let expected = "dir/m is not a model: the file begins with \".PNG.\", expected `PLXMODEL` (Parallax), \
                         `MATLAB 5.0` (Yang & Ramanan) or `partsNbr` (the authors' text)";
         assert_eq!(outcome("m", b"\x89PNG\n"), expected);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_for_a_missing_model_tells_where_models_come_from() {
+    fn the_error_for_a_missing_model_explains_where_models_come_from() {
         let error = read(Path::new("no/such.plx")).unwrap_err();
         assert!(matches!(error, ModelFileError::Absent { .. }));
         assert!(error.to_string().starts_with("there is no model file no/such.plx: "));

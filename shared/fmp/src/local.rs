@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn where_a_part_of_the_image_was_searched_it_reads_that_part() {
+    fn local_scores_are_read_from_the_searched_region() {
         let model = model();
         let layout = Layout::new(&model, 160, 120).unwrap();
         let region = Region {

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_put_back_first_is_taken_first_and_then_new_ones_are_made() {
+    fn returned_values_are_taken_in_order_and_then_new_ones_are_created() {
         let pool = Pool::<Vec<u8>>::default();
         pool.put_back(vec![7]);
         pool.put_back(vec![8]);
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_limit_nothing_is_kept() {
+    fn values_beyond_the_limit_are_not_kept() {
         let pool = Pool::<u32>::default();
         for number in 1..=MOST as u32 + 1 {
             pool.put_back(number);

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_back_with_an_even_size() {
+    fn a_written_video_is_read_back_with_an_even_size() {
         if !has_ffmpeg() {
             return;
         }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_that_cannot_be_written_is_named_with_the_reason() {
+    fn an_unwritable_path_is_named_with_the_reason() {
         if !has_ffmpeg() {
             return;
         }

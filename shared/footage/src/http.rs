@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_answer_is_told_by_its_head() {
+    fn an_answer_is_recognised_by_its_header() {
         let of = |kind: &str, more: &str| {
             of_head(&format!(
                 "HTTP/1.1 200 OK\r\nContent-Type: {kind}\r\n{more}\r\n"
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_no_answer() {
+    fn a_missing_server_and_other_protocols_give_no_answer() {
         assert_eq!(ask("http://127.0.0.1:1/x"), None);
         assert_eq!(ask("rtsp://127.0.0.1/x"), None);
     }

@@ -107,7 +107,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_frame_is_the_latest_due_from_its_due_time_on(
+        fn from_its_due_time_a_frame_is_the_latest_due_frame(
             start in 0_u64..1 << 60, rate_hz in 0.1..2000.0, k in 0_u64..10_000_000,
         ) {
             let pacer = Pacer::realtime(start, rate_hz);

@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn every_picture_is_a_piece_and_the_head_stands_before_those_that_need_no_other() {
+    fn every_picture_is_one_piece_and_key_pictures_include_the_header() {
         let pictures = [
             cluster(40, true, b"a"),
             cluster(80, false, b"bb"),
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_in_a_group_needs_others_if_it_refers_to_them() {
+    fn a_picture_is_a_key_picture_if_it_refers_to_no_other() {
         let block = element(&[0xa1], &[0x81, 0, 0, 0, 9]);
         let alone = element(&[0xa0], &block);
         let with = element(&[0xa0], &[block, element(&[0xfb], &[0xff])].concat());
@@ -305,13 +305,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_cut_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn any_bytes_are_split_into_pieces_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             cut(&bytes);
             cut(&[head(), bytes].concat());
         }
 
         #[test]
-        fn a_stream_that_is_cut_off_gives_its_whole_pictures(n in 0_usize..200) {
+        fn a_truncated_stream_gives_its_complete_pictures(n in 0_usize..200) {
             let whole = [head(), cluster(1, true, &[7; 60]), cluster(2, false, &[8; 40])].concat();
             let pieces = cut(&whole[..n.min(whole.len())]);
             prop_assert!(pieces.len() <= 3);

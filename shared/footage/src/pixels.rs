@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn black_white_and_red_are_what_they_are() {
+    fn black_white_and_red_are_converted_correctly() {
         let two = Size::new(2, 1);
         let of = |bytes: &[u8]| rgb(PixelFormat::Yuyv, bytes, 0, two).unwrap();
         assert_eq!(of(&[16, 128, 235, 128]), [0, 0, 0, 255, 255, 255]);
@@ -178,13 +178,13 @@ mod tests {
     }
 
     #[test]
-    fn gaps_between_rows_are_left_out() {
+    fn padding_between_rows_is_skipped() {
         let got = rgb(PixelFormat::Grey, &[1, 2, 99, 3, 4], 3, Size::new(2, 2)).unwrap();
         assert_eq!(got, [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4]);
     }
 
     #[test]
-    fn a_jpeg_file_that_is_cut_off_is_damaged() {
+    fn a_truncated_jpeg_file_counts_as_damaged() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.jpg");
         let red = [200, 30, 30].repeat(16 * 8);
@@ -200,7 +200,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn bytes_of_any_number_are_read_or_refused(
+        fn any_number_of_bytes_is_decoded_or_refused(
             format in prop::sample::select(&PixelFormat::ALL[..]),
             bytes in prop::collection::vec(any::<u8>(), 0..200),
             stride in 0_usize..40, width in 1_usize..9, height in 1_usize..6,

@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_clock_that_stays_at_its_distance_is_one() {
+    fn only_a_clock_with_a_constant_offset_is_accepted() {
         let mut offsets = Offsets::default();
         let told = |nth: i64, jitter: i64| Told {
             presented: nth * 40 * MS,
@@ -302,7 +302,7 @@ mod tests {
     /// Checks the output of the real program for packets that arrive all at the same time.
     #[expect(clippy::print_stderr, reason = "a skipped test must say so")]
     #[test]
-    fn every_picture_of_the_real_program_has_a_time() {
+    fn ffmpeg_gives_every_picture_a_time() {
         let folder = tempfile::tempdir().unwrap();
         let clip = folder.path().join("clip.mp4");
         let made = Command::new("ffmpeg")
@@ -330,7 +330,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        fn any_bytes_are_parsed_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
             let mut offsets = Offsets::default();
             for stream in [bytes.clone(), [head(), bytes.clone()].concat(), [head(), boxed(*b"prft", &bytes)].concat()] {
                 for told in read(&stream) {

@@ -440,7 +440,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_password_is_in_no_error() {
+    fn errors_never_contain_a_password() {
         let spec = StreamSpec::new("rtsp://me:secret@127.0.0.1:9/a");
         let said = spec.failed("rtsp://me:secret@127.0.0.1:9/a: Connection refused").to_string();
         assert!(!said.contains("secret"), "{said}");
@@ -459,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn the_options_follow_the_kind_of_stream() {
+    fn decoder_options_depend_on_the_kind_of_stream() {
         let options = |address: &str| {
             let spec = StreamSpec {
                 transport: Some(Transport::Tcp),

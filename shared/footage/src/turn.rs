@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_shows_every_pixel_where_its_turn_puts_it() {
+    fn a_display_matrix_rotates_every_pixel_correctly() {
         for (a, b) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
             for sign in [1.0, -1.0] {
                 let [c, d] = [-b * sign, a * sign];
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_that_is_a_little_off_is_the_nearest_quarter() {
+    fn a_rotation_is_rounded_to_the_nearest_quarter_turn() {
         assert_eq!(
             Turn::of_matrix([0.1, 0.99, -0.99, 0.1]),
             Turn::clockwise(90).unwrap()

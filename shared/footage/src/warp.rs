@@ -287,7 +287,7 @@ mod tests {
         }
 
         #[test]
-        fn samples_in_few_steps_have_the_bits_of_the_reference(
+        fn samples_in_few_steps_equal_the_reference_bit_for_bit(
             angle in -3.2..3.2_f64, scale in 0.3..1.0_f64, tx in -40.0..60.0, ty in -40.0..60.0,
             size in (1..90_usize, 1..40_usize), replicate: bool,
         ) {

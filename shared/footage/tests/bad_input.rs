@@ -319,7 +319,7 @@ fn frames_of_damaged_video(start: u64, step: u64) -> Vec<(u64, [u8; 3])> {
 }
 
 #[test]
-fn frames_that_cannot_be_decoded_do_not_shift_the_others() {
+fn undecodable_frames_do_not_shift_the_others() {
     if !clip::has_ffmpeg() {
         return;
     }

@@ -105,7 +105,7 @@ fn kind(spec: &SourceSpec) -> SourceKind {
 }
 
 #[test]
-fn images_of_a_folder_a_glob_and_a_numbered_pattern_conform() {
+fn images_of_a_folder_or_glob_or_numbered_pattern_conform() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), N_FRAMES);
     // A folder must ignore these files; a glob and a pattern do not match them.
@@ -153,7 +153,7 @@ fn videos_of_several_codecs_and_containers_conform() {
 }
 
 #[test]
-fn a_video_has_its_own_rate_and_images_take_that_of_the_spec() {
+fn a_video_has_its_own_rate_and_images_use_the_given_rate() {
     let folder = tempfile::tempdir().unwrap();
     clip::write_images(folder.path(), 2);
     let path = folder.path().to_str().unwrap();

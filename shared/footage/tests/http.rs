@@ -73,7 +73,7 @@ fn a_camera_without_a_first_boundary_has_pictures() {
 }
 
 #[test]
-fn what_came_in_place_of_a_stream_is_told() {
+fn the_error_describes_an_answer_that_is_not_a_stream() {
     if !has_ffmpeg() {
         return;
     }

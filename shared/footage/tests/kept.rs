@@ -78,7 +78,7 @@ fn live() -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
 }
 
 #[test]
-fn a_stream_that_was_kept_gives_the_same_pictures_again() {
+fn a_recorded_stream_decodes_to_the_same_pictures() {
     if !clip::has_ffmpeg() {
         return;
     }

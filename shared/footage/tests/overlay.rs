@@ -56,7 +56,7 @@ fn edges_between_pixels_are_smoothed() {
 }
 
 #[test]
-fn a_disc_has_its_area_and_a_ring_has_a_hole() {
+fn a_disc_is_filled_and_a_ring_is_hollow() {
     let mut canvas = black();
     canvas.disc([20.0, 15.0], 8.0, INK);
     let area = std::f64::consts::PI * 64.0;
@@ -222,7 +222,7 @@ fn outside() -> impl Strategy<Value = f64> {
 
 proptest! {
     #[test]
-    fn drawing_in_the_colour_of_the_background_changes_nothing(
+    fn drawing_in_the_background_colour_does_not_change_pixels(
         a in [coordinate(), coordinate()], b in [coordinate(), coordinate()],
         width in prop_oneof![0.0..20.0, Just(f64::NAN), Just(1e300)],
     ) {
@@ -239,7 +239,7 @@ proptest! {
     }
 
     #[test]
-    fn shapes_outside_of_the_picture_change_nothing(
+    fn shapes_outside_of_the_picture_do_not_change_pixels(
         a in (outside(), coordinate()), b in (outside(), coordinate()), width in 0.0..20.0,
     ) {
         let (a, b) = (<[f64; 2]>::from(a), <[f64; 2]>::from(b));

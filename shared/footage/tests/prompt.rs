@@ -36,7 +36,7 @@ fn part(colour: &str) -> Vec<u8> {
 }
 
 #[test]
-fn the_last_picture_that_was_sent_is_there_though_no_other_follows() {
+fn the_last_picture_of_a_stream_is_available_without_a_following_one() {
     if !clip::has_ffmpeg() {
         return;
     }

@@ -49,7 +49,7 @@ fn turned(from: &Path, to: &str, [a, b, c, d]: [i32; 4]) -> PathBuf {
 }
 
 #[test]
-fn films_are_turned_as_their_display_matrix_asks_where_that_is_wanted() {
+fn videos_are_rotated_by_their_display_matrix_on_request() {
     if !has_ffmpeg() {
         return;
     }
@@ -90,7 +90,7 @@ fn films_are_turned_as_their_display_matrix_asks_where_that_is_wanted() {
 }
 
 #[test]
-fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
+fn every_photograph_of_a_folder_is_rotated_by_its_own_tag() {
     let folder = tempfile::tempdir().unwrap();
     for (nth, value) in [(0, 6_u8), (1, 8), (2, 6)] {
         let mut file = Vec::new();
@@ -112,7 +112,7 @@ fn every_photograph_of_a_folder_is_turned_as_its_own_tag_asks() {
 }
 
 #[test]
-fn films_are_shrunk_by_what_divides_their_sides_to_the_means_of_their_pixels() {
+fn videos_are_shrunk_by_a_divisor_of_their_size_to_means_of_pixels() {
     if !has_ffmpeg() {
         return;
     }
@@ -159,7 +159,7 @@ fn films_are_shrunk_by_what_divides_their_sides_to_the_means_of_their_pixels() {
 }
 
 #[test]
-fn frames_that_an_edit_list_cuts_off_are_none() {
+fn frames_excluded_by_an_edit_list_are_skipped() {
     if !has_ffmpeg() {
         return;
     }
@@ -184,7 +184,7 @@ fn frames_that_an_edit_list_cuts_off_are_none() {
 }
 
 #[test]
-fn a_stream_without_a_container_has_all_its_pictures_and_no_rate_that_nobody_told() {
+fn a_raw_stream_has_all_its_pictures_and_no_invented_rate() {
     if !has_ffmpeg() {
         return;
     }
@@ -219,7 +219,7 @@ fn a_stream_without_a_container_has_all_its_pictures_and_no_rate_that_nobody_tol
 }
 
 #[test]
-fn the_film_is_read_and_not_the_cover_in_front_of_it() {
+fn the_video_is_read_instead_of_the_cover_picture_before_it() {
     if !has_ffmpeg() {
         return;
     }
@@ -291,7 +291,7 @@ fn cut(folder: &Path, name: &str, is_cut: impl Fn(usize) -> bool) -> PathBuf {
 }
 
 #[test]
-fn pictures_that_are_cut_are_left_out_and_counted() {
+fn truncated_pictures_are_left_out_and_counted() {
     if !has_ffmpeg() {
         return;
     }
@@ -314,7 +314,7 @@ fn pictures_that_are_cut_are_left_out_and_counted() {
 }
 
 #[test]
-fn numbered_pictures_are_frames_by_their_numbers() {
+fn numbered_pictures_get_their_numbers_as_frame_numbers() {
     let folder = tempfile::tempdir().unwrap();
     write_images(folder.path(), 12);
     for nth in [4, 5, 9] {
@@ -367,7 +367,7 @@ fn pictures_with_12_bits_of_16_are_scaled() {
 }
 
 #[test]
-fn interlaced_films_say_so() {
+fn interlaced_videos_are_reported() {
     if !has_ffmpeg() {
         return;
     }

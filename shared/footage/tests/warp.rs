@@ -42,7 +42,7 @@ fn at(rgb: &[u8], size: Size, x: usize, y: usize) -> [u8; 3] {
 }
 
 #[test]
-fn the_identity_copies() {
+fn the_identity_copies_the_image() {
     let size = Size::new(13, 7);
     let map = resize_map(size, size);
     assert_eq!(map, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
@@ -53,7 +53,7 @@ fn the_identity_copies() {
 }
 
 #[test]
-fn a_shift_by_whole_pixels_moves_and_fills() {
+fn a_shift_by_whole_pixels_moves_the_image_and_fills_the_border() {
     let size = Size::new(13, 7);
     let source = noise(size);
     let map = [[1.0, 0.0, 3.0], [0.0, 1.0, -2.0]];
@@ -206,7 +206,7 @@ proptest! {
 
     /// Red is the column and green the row, so the output shows the map itself.
     #[test]
-    fn a_ramp_shows_the_affine_map(
+    fn a_ramp_is_warped_by_the_affine_map(
         degrees in -180.0..180.0, scale in 0.4..6.0, dx in -3.0..3.0, dy in -3.0..3.0,
     ) {
         ramp_shows(degrees, scale, [dx, dy])?;
@@ -290,7 +290,7 @@ proptest! {
 }
 
 #[test]
-fn a_ramp_shows_the_map_of_a_rolled_camera() {
+fn a_ramp_is_warped_by_the_map_of_a_rolled_camera() {
     ramp_shows(28.0, 4.0, [0.0, 0.0]).unwrap();
 }
 

@@ -142,7 +142,7 @@ fn errors(outcome: &Outcome, truth: &[Camera]) -> [f64; 3] {
 }
 
 #[test]
-fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
+fn a_rig_is_found_even_if_opposite_cameras_never_see_the_board_together() {
     let truth = ring(5, BROWN);
     let board = board(6, 4);
     let show = Show {
@@ -193,7 +193,7 @@ fn a_rig_is_found_from_a_board_that_no_two_opposite_cameras_see_together() {
 }
 
 #[test]
-fn a_fisheye_is_found() {
+fn a_fisheye_lens_is_calibrated() {
     let lens = LensModel::KannalaBrandt {
         k: [0.02, -0.01, 0.003, 0.0],
     };
@@ -219,7 +219,7 @@ fn a_fisheye_is_found() {
 }
 
 #[test]
-fn a_board_that_looks_the_same_turned_is_told_by_the_cameras_together() {
+fn the_orientation_of_a_symmetric_board_is_decided_by_all_cameras_together() {
     let truth = ring(4, BROWN);
     let board = board(6, 4);
     let show = Show {
@@ -251,7 +251,7 @@ fn a_board_that_looks_the_same_turned_is_told_by_the_cameras_together() {
 }
 
 #[test]
-fn what_cannot_be_known_is_refused_with_the_reason() {
+fn pictures_that_do_not_determine_the_cameras_are_refused_with_the_reason() {
     let truth = ring(4, BROWN);
     let board = board(6, 4);
     let show = Show {
@@ -282,7 +282,7 @@ fn what_cannot_be_known_is_refused_with_the_reason() {
 }
 
 #[test]
-fn cameras_out_of_step_are_doubted() {
+fn unsynchronised_cameras_are_reported() {
     let truth = ring(3, BROWN);
     let board = board(6, 4);
     let show = Show {
@@ -307,7 +307,7 @@ fn cameras_out_of_step_are_doubted() {
 }
 
 #[test]
-fn a_board_with_two_sides_tells_how_opposite_cameras_stand() {
+fn a_two_sided_board_connects_opposite_cameras() {
     let truth = [ring(4, BROWN)[0].clone(), ring(4, BROWN)[2].clone()];
     let board = board(6, 4);
     let random = &mut fastrand::Rng::with_seed(5);
@@ -389,7 +389,7 @@ fn errors_in_deviations(outcome: &Outcome, truth: &[Camera]) -> Vec<f64> {
 }
 
 #[test]
-fn cameras_out_of_step_have_lenses_by_their_own_pictures_and_what_is_stated_holds() {
+fn unsynchronised_cameras_get_lenses_from_their_own_pictures_and_given_offsets_are_used() {
     let truth = ring(3, BROWN);
     let board = board(6, 4);
     let mut errors_stated = Vec::new();

@@ -328,7 +328,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_board_is_read_from_a_line_of_text_and_written_to_one() {
+    fn a_board_is_parsed_from_a_line_of_text_and_written_back() {
         for (text, written) in [
             ("charuco:7x5:40mm", "charuco:7x5:40mm:4x4_1000:marker=0.75"),
             (
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_board_is_refused_with_what_was_expected() {
+    fn an_invalid_board_is_refused_with_the_expected_form() {
         for (text, said) in [
             ("", "is not a board"),
             ("charuco:7:40mm", "is not a board"),
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_read_is_written_so_that_it_is_read_again() {
+    fn every_parsed_board_survives_a_round_trip() {
         let seeds = [
             "charuco:7x5:40mm:5x5_100:marker=30mm:legacy",
             "aprilgrid:6x6:88mm:36h11:gap=0.3",

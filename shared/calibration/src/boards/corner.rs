@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_blurred_crossing_is_found_to_hundredths_of_a_pixel() {
+    fn a_blurred_corner_is_found_to_a_hundredth_of_a_pixel() {
         let truth = Point2::new(20.37, 19.81);
         let soft = |value: f64| (value / 1.2).tanh();
         let pixels = (0..40 * 40).map(|i| {

@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_map_of_four_points_is_exact_and_none_for_points_on_a_line() {
+    fn a_homography_of_four_points_is_exact_and_collinear_points_give_none() {
         let to = [[10.0, 12.0], [210.0, 5.0], [190.0, 160.0], [22.0, 140.0]].map(Point2::from);
         let map = Homography::of_unit_square(to).unwrap();
         assert!((map.apply(Point2::new(1.0, 1.0)).unwrap() - to[2]).norm() < 1e-9);

@@ -125,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_charuco_board_is_that_of_opencv() {
+    fn a_charuco_board_equals_that_of_opencv() {
         let board: Board = "charuco:4x5:54mm".parse().unwrap();
         let layout = Layout::of(&board);
         assert_eq!((layout.points.len(), layout.markers.len()), (12, 10));

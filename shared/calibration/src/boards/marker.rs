@@ -210,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn four_turns_are_none_and_two_mirrors_too() {
+    fn four_quarter_turns_and_two_mirrors_give_the_same_marker() {
         let code = 0b1011_0010_0111_0001;
         let turned = turns(turns(code, 4)[3], 4)[1];
         assert_eq!(turned, code);

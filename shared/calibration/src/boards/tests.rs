@@ -122,7 +122,7 @@ fn finder(text: &str) -> Finder {
 }
 
 #[test]
-fn printed_boards_are_found_where_they_are() {
+fn printed_boards_are_found_at_the_right_place() {
     for (text, size, angle) in [
         ("charuco:7x5:40mm", [640, 480], 0.3),
         ("charuco:4x6:54mm:5x5_250:legacy", [480, 640], 2.2),
@@ -147,7 +147,7 @@ fn printed_boards_are_found_where_they_are() {
 }
 
 #[test]
-fn inverted_and_mirrored_pictures_are_found_and_named() {
+fn boards_in_inverted_and_mirrored_pictures_are_found_and_reported() {
     let text = "charuco:5x7:30mm";
     let shot = shot(text, [400, 400], 0.2);
     let inverted = finder(text).find(&shot.picture.inverted(), Hints::default());
@@ -163,7 +163,7 @@ fn inverted_and_mirrored_pictures_are_found_and_named() {
 }
 
 #[test]
-fn confused_counts_and_patterns_are_named() {
+fn confused_counts_and_patterns_are_named_in_the_error() {
     for (told, printed, said) in [
         (
             "charuco:7x5:30mm",
@@ -192,7 +192,7 @@ fn confused_counts_and_patterns_are_named() {
 }
 
 #[test]
-fn a_picture_without_a_board_has_none() {
+fn no_board_is_found_in_a_picture_without_one() {
     let noise = |seed| {
         let mut random = fastrand::Rng::with_seed(seed);
         let pixels = (0..120 * 90).map(|_| random.u8(..)).collect();

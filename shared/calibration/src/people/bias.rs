@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn what_joints_err_by_all_the_time_is_told_from_noise() {
+    fn a_constant_error_of_joints_is_distinguished_from_noise() {
         let found = share_of(&residuals(0.006, 0.008)).unwrap();
         assert!((0.006..0.010).contains(&found), "{found}");
         let noise = share_of(&residuals(0.006, 0.0));
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_is_hardly_seen_has_none() {
+    fn a_rarely_seen_joint_has_no_constant_error() {
         let seen = |camera| super::super::instant::Seen {
             camera,
             point: 0,

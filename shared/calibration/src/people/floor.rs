@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn the_floor_is_where_people_stand() {
+    fn the_floor_is_estimated_at_the_feet_of_people() {
         for noise in [0.0, 0.004] {
             let (times_s, skeletons, moved) = walk(1.0, noise);
             let found = floor(&times_s, &skeletons).unwrap();
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stays_on_one_spot_tells_the_vertical_by_the_body_and_nobody_tells_nothing() {
+    fn a_person_on_one_spot_gives_the_vertical_by_the_body_and_an_empty_room_gives_none() {
         let (times_s, skeletons, _) = walk(0.0, 0.002);
         let found = floor(&times_s, &skeletons).unwrap();
         assert_ne!(found.vertical, Vertical::Feet);

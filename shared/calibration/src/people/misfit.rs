@@ -131,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_picture_whose_person_is_elsewhere_comes_first() {
+    fn the_picture_with_the_largest_error_is_listed_first() {
         let cameras = ring(3);
         let times_s: Vec<f64> = (0..40).map(|i| f64::from(i) * 0.1).collect();
         let skeletons: Skeletons = times_s

@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_seen_large_and_surely_comes_before_what_is_seen_longer() {
+    fn a_large_and_certain_person_is_preferred_to_one_seen_longer() {
         let mut film = standing();
         let chair = |joint: Joint| Joint {
             at: joint.at.map(|at| 100.0 + 0.3 * (at - 300.0)),
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_person_whose_pose_is_seen_in_two_ways_for_a_moment_stays_one() {
+    fn a_person_with_two_candidates_for_a_moment_stays_one_person() {
         let camera = ideal(&ring(3)[0]);
         let size = chains(&standing(), &camera, N_JOINTS, 0.1)[0].size();
         for (share, n, seen_s) in [(0.28, 1, 2.0), (0.5, 2, 1.0)] {
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_speed_errs_by_itself_wherever_between_two_pictures_it_is_asked_for() {
+    fn errors_of_the_velocity_are_independent_of_errors_of_the_position() {
         let camera = ideal(&ring(3)[0]);
         let chains = chains(&standing(), &camera, N_JOINTS, 0.1);
         let chain = &chains[0];

@@ -49,7 +49,7 @@ fn found(truth: &[Camera], flaws: &Flaws, settings: &Settings) -> Outcome {
 }
 
 #[test]
-fn the_height_of_the_person_and_the_feet_make_a_world() {
+fn the_height_of_the_person_and_the_feet_define_the_world() {
     let truth = ring(4);
     let films = Flaws::none(3).films(&truth);
     let given = nowhere(&truth);
@@ -80,7 +80,7 @@ fn the_height_of_the_person_and_the_feet_make_a_world() {
 }
 
 #[test]
-fn clocks_are_found_with_the_cameras() {
+fn clock_offsets_are_estimated_together_with_the_cameras() {
     let truth = ring(4);
     let flaws = Flaws {
         offsets_s: vec![0.0, 0.04, -0.07, 0.02],
@@ -96,7 +96,7 @@ fn clocks_are_found_with_the_cameras() {
 }
 
 #[test]
-fn clocks_that_joints_do_not_contradict_are_as_given() {
+fn given_clock_offsets_are_kept_if_the_joints_agree() {
     let truth = ring(3);
     let flaws = Flaws {
         offsets_s: vec![0.0, 0.04, -0.07],
@@ -131,7 +131,7 @@ fn drifting(films: &mut [Film], px: f64, seed: u64) {
 }
 
 #[test]
-fn deviations_are_those_of_the_answers_where_errors_last() {
+fn stated_deviations_match_the_errors_even_if_joint_errors_persist_over_time() {
     let truth = ring(4);
     let (mut squares, mut n) = ([0.0; 2], 0.0);
     for seed in 0..3 {
@@ -158,7 +158,7 @@ fn deviations_are_those_of_the_answers_where_errors_last() {
 }
 
 #[test]
-fn a_rig_that_is_not_known_well_says_so() {
+fn an_uncertain_rig_is_reported_as_uncertain() {
     let truth = ring(3);
     let mut films = Flaws::none(4).films(&truth);
     drifting(&mut films, 4.0, 4);
@@ -177,7 +177,7 @@ fn a_rig_that_is_not_known_well_says_so() {
 }
 
 #[test]
-fn what_cannot_be_known_is_refused() {
+fn footage_that_does_not_determine_the_rig_is_refused() {
     let truth = ring(3);
     // Cameras that filmed at different times cannot be calibrated together.
     let mut films = Flaws::none(1).films(&truth);
@@ -207,7 +207,7 @@ fn what_cannot_be_known_is_refused() {
 const N_SEEDS: u64 = 2;
 
 #[test]
-fn rings_are_found_and_no_wrong_answer_goes_unrefused() {
+fn rings_of_cameras_are_found_and_wrong_results_are_refused() {
     for n in [3, 5] {
         let truth = ring(n);
         let (mut turns, mut ways, mut refused) = (Vec::new(), Vec::new(), 0);
@@ -253,7 +253,7 @@ fn beside(films: &mut [Film], px: f64) {
 }
 
 #[test]
-fn what_joints_err_by_all_the_time_is_no_movement_of_the_cameras() {
+fn constant_errors_of_joints_are_not_mistaken_for_moved_cameras() {
     let truth = ring(4);
     let flaws = Flaws {
         size: 0.5,

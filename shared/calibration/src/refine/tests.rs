@@ -28,7 +28,7 @@ fn turned(camera: &Camera, degrees: f64) -> Camera {
 }
 
 #[test]
-fn a_camera_that_was_turned_is_put_right() {
+fn a_rotated_camera_is_corrected() {
     let truth = ring(4);
     let films = Flaws::usual(2).films(&truth);
     let mut given = truth.clone();
@@ -49,7 +49,7 @@ fn a_camera_that_was_turned_is_put_right() {
 }
 
 #[test]
-fn a_rig_that_is_right_is_no_better_afterwards() {
+fn refining_a_correct_rig_does_not_improve_it() {
     let truth = ring(4);
     let films = Flaws::usual(4).films(&truth);
     let recording = Recording {

@@ -36,7 +36,7 @@ fn check(outcome: &Outcome, truth_s: &[f64], most_s: f64) {
 }
 
 #[test]
-fn six_seconds_of_walking_tell_offsets_within_three_milliseconds() {
+fn six_seconds_of_walking_give_offsets_within_three_milliseconds() {
     let cameras = ring(3);
     let plain = recording(6.0);
     check(
@@ -57,7 +57,7 @@ fn six_seconds_of_walking_tell_offsets_within_three_milliseconds() {
 }
 
 #[test]
-fn a_finder_that_puts_joints_aside_by_the_direction_of_view_moves_no_clock() {
+fn a_view_dependent_bias_of_joints_does_not_change_the_offsets() {
     let cameras = ring(3);
     let mut films = recording(6.0).films(&cameras, &walking);
     for (camera, film) in films.iter_mut().enumerate() {
@@ -77,7 +77,7 @@ fn a_finder_that_puts_joints_aside_by_the_direction_of_view_moves_no_clock() {
 }
 
 #[test]
-fn sides_that_follow_the_picture_do_not_matter_where_that_is_known() {
+fn sides_as_seen_in_the_picture_do_not_matter_if_declared() {
     let cameras = ring(3);
     let films = Recording {
         exchanged: 0.0,
@@ -101,7 +101,7 @@ fn sides_that_follow_the_picture_do_not_matter_where_that_is_known() {
 }
 
 #[test]
-fn a_drift_is_told_where_the_footage_is_long_enough() {
+fn a_drift_is_estimated_from_long_enough_footage() {
     let cameras = ring(2);
     let films = Recording {
         rates_hz: vec![15.0; 2],
@@ -140,7 +140,7 @@ fn working(time_s: f64) -> Vec<[[f64; 3]; N_JOINTS]> {
 }
 
 #[test]
-fn slow_people_tell_no_drift_and_no_offset_that_is_surer_than_right() {
+fn slow_movement_gives_no_drift_and_no_overconfident_offset() {
     let cameras = ring(3);
     let films = Recording {
         rates_hz: vec![25.0; 3],
@@ -157,7 +157,7 @@ fn slow_people_tell_no_drift_and_no_offset_that_is_surer_than_right() {
 }
 
 #[test]
-fn what_tells_no_offset_is_refused() {
+fn footage_without_offset_information_is_refused() {
     let cameras = ring(3);
     let plain = recording(6.0);
     let refused = |label: &str, outcome: &Outcome| {
@@ -209,7 +209,7 @@ fn what_tells_no_offset_is_refused() {
 }
 
 #[test]
-fn a_camera_that_sees_nobody_is_named_and_the_others_are_told() {
+fn a_camera_without_people_is_named_and_the_others_get_offsets() {
     let cameras = ring(3);
     let mut films = recording(5.0).films(&cameras, &walking);
     let offsets_s = OFFSETS_S;
@@ -229,7 +229,7 @@ fn a_camera_that_sees_nobody_is_named_and_the_others_are_told() {
 }
 
 #[test]
-fn films_that_cannot_be_are_refused() {
+fn impossible_joint_tracks_are_refused() {
     let cameras = ring(2);
     let film = |times: &[f64]| Film {
         shots: times

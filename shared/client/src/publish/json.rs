@@ -101,7 +101,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_line_says_where_joints_are_and_why_they_are_nowhere() {
+    fn a_line_contains_joint_positions_and_reasons_for_missing_ones() {
         let text = json_datagram(&frame(&["head", "neck", "right \"wrist\""])).unwrap();
         assert!(text.ends_with("}}\n") && !text[..text.len() - 1].contains('\n'));
         let value: Value = serde_json::from_str(&text).unwrap();
@@ -120,7 +120,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn names_are_left_out_where_they_do_not_fit_and_too_much_is_not_sent() {
+    fn names_that_do_not_fit_are_left_out_and_too_large_lines_are_not_sent() {
         let long: Vec<String> =
             (0..32).map(|i| format!("a joint with a very long name {i}")).collect();
         let names: Vec<&str> = long.iter().map(String::as_str).collect();

@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_is_four_numbers_and_one_that_is_nowhere_has_none() {
+    fn a_joint_is_sent_as_four_numbers_and_a_missing_joint_as_none() {
         let datagrams = osc_datagrams(&frame(&["head", "right wrist", "neck"]));
         assert_eq!(datagrams.len(), 1);
         let messages = messages(&datagrams[0]);
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_goes_into_another_bundle_with_the_same_head() {
+    fn joints_that_do_not_fit_are_sent_in_another_bundle_with_the_same_header() {
         let many: Vec<String> = (0..128).map(|i| format!("joint/{i}")).collect();
         let names: Vec<&str> = many.iter().map(String::as_str).collect();
         let datagrams = osc_datagrams(&frame(&names));

@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn targets_are_read() {
+    fn targets_are_parsed() {
         let of =
             |text: &str| Target::parse(text).map(|value| (value.address.to_string(), value.form));
         let loopback = |form| Ok(("127.0.0.1:9000".to_owned(), form));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn other_machines_are_told_apart() {
+    fn targets_on_other_machines_are_distinguished() {
         let of = |text: &str| Target::parse(text).unwrap().stays_here();
         assert_eq!(of("udp://127.0.0.2:9000"), Ok(()));
         assert_eq!(of("udp://[::1]:9000"), Ok(()));
@@ -159,7 +159,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_text_is_read_or_refused(text in "\\PC{0,40}") {
+        fn any_text_is_parsed_as_a_target_or_refused(text in "\\PC{0,40}") {
             drop(Target::parse(&text));
             drop(Target::parse(&format!("udp://{text}")));
         }

@@ -28,7 +28,7 @@ fn views_belong_to_hosts_and_keys_lie_beside_the_file() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_key() {
+fn impossible_host_settings_are_refused_with_their_key() {
     for (from, to, key) in [
         ("name = 'far'", "name = 'desk'", "host.name"),
         ("name = 'far'", "name = 'Far'", "host.name"),
@@ -81,7 +81,7 @@ fn what_cannot_be_is_refused_with_its_key() {
 }
 
 #[test]
-fn a_deployment_without_hosts_says_nothing_of_them() {
+fn a_deployment_without_hosts_has_no_host_settings() {
     let text = GOOD.split("[link]").next().unwrap();
     let it = parse(text).unwrap();
     assert!(it.hosts.is_empty() && it.fusing_host().is_none());

@@ -218,7 +218,7 @@ const ROWS: &[Row] = &[
 ];
 
 #[test]
-fn every_key_with_a_number_says_what_it_may_be() {
+fn every_numeric_key_states_its_range() {
     let mut wrong = Vec::new();
     for (key, refused, taken) in ROWS {
         for (value, words) in *refused {
@@ -245,7 +245,7 @@ fn every_key_with_a_number_says_what_it_may_be() {
 }
 
 #[test]
-fn what_is_hardly_meant_is_named_with_its_number() {
+fn implausible_values_are_named_with_their_number() {
     let doubts = |set: &str| read(set).unwrap().deployment.doubts(Some(4));
     assert_eq!(doubts("capture.mode=lossless"), Vec::<String>::new());
     for (set, words) in [
@@ -269,7 +269,7 @@ fn what_is_hardly_meant_is_named_with_its_number() {
 }
 
 #[test]
-fn a_camera_has_footage_or_keypoints_and_names_of_these_that_are_known() {
+fn a_camera_needs_footage_or_keypoints_with_known_names() {
     let of_camera = |lines: &str| {
         let text = format!("{SHORT}[[camera]]\nname = 'c'\n{lines}\n");
         let read = Loaded::parse(&text, Path::new("/room/deployment.toml"), &[], &AnyMachine);

@@ -38,7 +38,7 @@ fn refused(text: &str, set: &[&str]) -> String {
 }
 
 #[test]
-fn a_slip_of_the_pen_is_told_with_its_line() {
+fn a_common_mistake_is_reported_with_its_line() {
     let with = |from: &str, to: &str| refused(&SHORT.replace(from, to), &[]);
     let path = with("videos/a.mp4", r"C:\Users\a.mp4");
     assert!(path.starts_with("deployment.toml:9: a backslash"), "{path}");
@@ -73,7 +73,7 @@ fn relative_paths_are_relative_to_the_file() {
 }
 
 #[test]
-fn the_command_line_wins_over_the_file() {
+fn the_command_line_takes_precedence_over_the_file() {
     let set = [
         "paper.workers=3",
         "paper.energy=released",
@@ -86,7 +86,7 @@ fn the_command_line_wins_over_the_file() {
 }
 
 #[test]
-fn a_list_that_is_too_long_is_refused_and_a_shorter_one_may_replace_a_longer() {
+fn a_list_that_is_too_long_is_refused_and_a_shorter_list_can_replace_a_longer_one() {
     let text = SHORT.replace("workers = 2", "pairs = [['a', 'b'], ['b', 'a']]");
     let one = read(&text, &["paper.pairs=[['a', 'b']]"]).unwrap();
     assert_eq!(one.deployment.paper.pairs.len(), 1);
@@ -135,7 +135,7 @@ fn a_value_of_another_kind_is_refused_with_its_line() {
 }
 
 #[test]
-fn a_value_that_cannot_be_is_refused_with_its_line() {
+fn an_impossible_value_is_refused_with_its_line() {
     let text = SHORT.replace("workers = 2", "workers = 0");
     assert_eq!(
         refused(&text, &[]),
@@ -144,7 +144,7 @@ fn a_value_that_cannot_be_is_refused_with_its_line() {
 }
 
 #[test]
-fn what_has_no_meaning_for_all_views_at_once_is_refused() {
+fn settings_that_do_not_apply_to_all_views_at_once_are_refused() {
     let text = SHORT.replace("workers = 2", "views = \"all\"");
     read(&text, &[]).unwrap();
     for (set, expected) in [
@@ -187,12 +187,12 @@ fn is_taken(text: &str, set: &str) -> bool {
 
 proptest! {
     #[test]
-    fn any_text_is_a_deployment_or_an_error_with_its_place(text: String, set: String) {
+    fn any_text_is_parsed_as_a_deployment_or_gives_an_error_with_its_line(text: String, set: String) {
         is_taken(&text, &set);
     }
 
     #[test]
-    fn a_changed_deployment_is_one_or_an_error_with_its_place(
+    fn a_changed_deployment_is_valid_or_gives_an_error_with_its_line(
         at in 0..SHORT.len(),
         n in 0_usize..6,
         to in "[a-z0-9=\\[\\]{}.,\"'\n -]{0,8}",
@@ -203,7 +203,7 @@ proptest! {
     }
 
     #[test]
-    fn any_value_of_a_known_key_is_taken_or_refused(
+    fn any_value_of_a_known_key_is_accepted_or_refused(
         key in prop::sample::select(keys().into_iter().map(|key| key.name).collect::<Vec<_>>()),
         value in prop::sample::select(vec![
             "-1", "0", "1", "99999999999", "1e308", "nan", "-inf", "''", "'x'", "[]", "[1]",
@@ -234,7 +234,7 @@ fn a_wrong_value_is_refused_with_its_line() {
 }
 
 #[test]
-fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
+fn every_running_process_accepts_cores_and_other_names_are_refused() {
     let loaded = read(SHORT, &["paper.errors=shipped"]).unwrap();
     let topology = crate::Topology::new(&loaded.deployment, None, None);
     for process in topology.processes() {
@@ -254,7 +254,7 @@ fn whatever_runs_by_the_file_alone_may_be_given_cores_and_nothing_else() {
 }
 
 #[test]
-fn a_number_larger_than_any_is_refused_as_its_key_asks() {
+fn a_number_that_overflows_is_refused_with_the_expected_type() {
     let text = SHORT.replace("workers = 2", "workers = 99999999999999999999");
     let got = refused(&text, &[]);
     assert!(
@@ -368,7 +368,7 @@ const EDITS: &[(&str, &str, &[&str])] = &[
 ];
 
 #[test]
-fn a_mistake_is_told_with_what_was_found_and_what_to_write() {
+fn an_error_states_the_value_found_and_the_value_to_write() {
     let lines = LINES
         .iter()
         .map(|(line, words)| (format!("{SHORT}\n[capture]\n{line}\n"), "", *words));

@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_camera_has_its_own_name_in_the_table_unless_another_is_set() {
+    fn a_camera_has_its_own_name_in_the_error_table_unless_another_is_set() {
         let text = "table = 't.csv'\nviews = { left = 'C1' }";
         let table: ErrorTable = toml::from_str(text).unwrap();
         assert_eq!(table.name_of("left"), "C1");

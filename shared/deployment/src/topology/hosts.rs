@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn every_process_of_the_whole_runs_on_exactly_one_host() {
+    fn every_process_of_the_deployment_runs_on_exactly_one_host() {
         for more in ["", "carry = 'poses'\n"] {
             let it = deployment(more);
             let whole = Topology::new(&it, None, None);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bridge_publishes_here_what_it_subscribes_to_there() {
+    fn the_bridge_publishes_the_topics_that_it_receives_from_other_hosts() {
         for (more, topics) in [
             ("", vec!["frame/v1/0", "frame/v1/2"]),
             (
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_with_cameras_has_what_crosses_and_nothing_else() {
+    fn a_host_with_cameras_has_only_its_topics_and_the_transferred_ones() {
         let it = deployment("");
         let far = Topology::new(&it, None, None).on_host(&it, &it.hosts[1]);
         assert_eq!(names(&far), ["bridge", "capture-0", "capture-2"]);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn the_maps_of_a_network_cross_with_its_poses() {
+    fn the_maps_of_a_network_are_transferred_with_its_poses() {
         let it = solved("space", "carry = 'poses'\n");
         let whole = Topology::new(&it, None, None);
         let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn hosts_do_not_change_the_processes_of_the_whole() {
+    fn hosts_do_not_change_the_processes_of_the_deployment() {
         let with = deployment("");
         let without = Deployment {
             hosts: Vec::new(),

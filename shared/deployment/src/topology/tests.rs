@@ -48,7 +48,7 @@ fn of_service<'a>(topology: &'a Topology, service: &str) -> Vec<&'a Process> {
 }
 
 #[test]
-fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed() {
+fn all_views_at_once_use_one_worker_for_any_allowed_number() {
     for n_views in 3..=6 {
         let deployment = deployment(n_views, "[paper]\nviews = 'all'\nworkers = 3\n");
         let recording = recording(false);
@@ -80,7 +80,7 @@ fn all_views_at_once_have_one_worker_for_every_process_however_many_are_allowed(
 }
 
 #[test]
-fn the_receivers_of_a_recorded_deployment_with_a_network_are_these() {
+fn topics_of_a_recorded_deployment_have_the_expected_receivers() {
     let deployment = deployment(3, "[paper]\nerrors = 'n'\nworkers = 2\n");
     let recording = recording(false);
     let topology = Topology::new(&deployment, Some(&recording), None);
@@ -137,7 +137,7 @@ fn numbers(rooms: &[Room]) -> Vec<Numbers<'_>> {
 }
 
 #[test]
-fn topics_have_this_room() {
+fn topics_have_the_expected_capacities() {
     let settings = "[paper]\nerrors = 'n'\nworkers = 2\n";
     let topology = Topology::new(&deployment(3, settings), None, None);
     let rooms = topology.rooms(Mode::Realtime, &[SIZE; 3], 4);
@@ -170,7 +170,7 @@ fn topics_have_this_room() {
 }
 
 #[test]
-fn the_answers_about_one_frame_of_many_views_find_room() {
+fn the_queue_holds_all_solutions_of_one_frame_of_many_views() {
     let all = deployment(7, "[paper]\nviews = 'all'\n");
     let rooms = Topology::new(&all, None, None).rooms(Mode::Realtime, &[SIZE; 7], 1);
     let answers = rooms.iter().find(|room| room.content == Content::PairPose);
@@ -192,7 +192,7 @@ fn every_pair_has_one_worker() {
 }
 
 #[test]
-fn a_view_is_read_by_the_workers_of_its_pairs() {
+fn a_view_is_received_by_the_workers_of_its_pairs() {
     let on = |n_views, settings: &str| {
         let topology = Topology::new(&deployment(n_views, settings), None, None);
         [0, 1, 2].map(|view| topology.workers_on(view))
@@ -234,7 +234,7 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn every_input_has_one_sender_and_all_count_the_same(
+    fn every_input_has_one_sender_and_receiver_counts_are_consistent(
         (n_views, settings) in any_settings(),
         without_evidence in prop::option::of(any::<bool>()),
         from in prop::option::of(prop::sample::select(Stage::ALL.to_vec())),
@@ -317,7 +317,7 @@ proptest! {
 }
 
 #[test]
-fn pictures_of_live_cameras_travel_where_they_are_recorded_only() {
+fn encoded_pictures_of_live_cameras_are_sent_only_if_recorded() {
     let deployment = deployment(3, "");
     let plan = RecordingPlan {
         pictures: vec![1],

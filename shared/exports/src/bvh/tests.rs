@@ -94,7 +94,7 @@ fn bound(trial: &Trial, slot: usize, node: usize) -> f64 {
 }
 
 #[test]
-fn forward_kinematics_gives_the_joints_back_within_the_change_of_bone_length() {
+fn forward_kinematics_gives_the_joints_within_the_variation_of_bone_length() {
     let mut trial = walker(60);
     // The bones change their lengths: every joint is moved by up to 3 cm.
     for (slot, content) in trial.slots.iter_mut().enumerate() {
@@ -132,7 +132,7 @@ fn forward_kinematics_gives_the_joints_back_within_the_change_of_bone_length() {
 }
 
 #[test]
-fn bones_of_one_length_come_back_exactly() {
+fn joints_with_constant_bone_lengths_are_reproduced_exactly() {
     let trial = walker(1);
     let (joints, frames) = read(&written(&trial).0);
     let landmarks = Landmarks::of(&trial);
@@ -147,7 +147,7 @@ fn bones_of_one_length_come_back_exactly() {
 }
 
 #[test]
-fn what_is_held_and_what_is_left_out_is_said() {
+fn held_and_omitted_frames_are_reported() {
     let mut trial = walker(10);
     trial.slots[4].points.clear();
     trial.slots[5].points[0] = Err(Gap("implausible".into()));
@@ -167,7 +167,7 @@ fn what_is_held_and_what_is_left_out_is_said() {
 }
 
 #[test]
-fn without_hips_there_is_nothing_to_hang_a_skeleton_on() {
+fn without_hips_no_skeleton_is_written() {
     let mut trial = walker(2);
     for slot in &mut trial.slots {
         slot.points[2] = Err(Gap("too few views".into()));
@@ -177,7 +177,7 @@ fn without_hips_there_is_nothing_to_hang_a_skeleton_on() {
 }
 
 #[test]
-fn angles_go_on_over_half_a_turn() {
+fn angles_continue_beyond_half_a_turn() {
     let mut last = [0.0; 3];
     for step in 0..100 {
         let angle = 0.1 * f64::from(step);

@@ -98,7 +98,7 @@ fn place(matrix: &Matrix4<f64>) -> Point3<f64> {
 }
 
 #[test]
-fn the_nodes_stand_where_the_joints_were_seen() {
+fn the_nodes_are_at_the_measured_joints() {
     let trial = walker(30);
     let read = Read::new(&trial);
     let landmarks = Landmarks::of(&trial);
@@ -116,7 +116,7 @@ fn the_nodes_stand_where_the_joints_were_seen() {
 }
 
 #[test]
-fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
+fn the_skin_connects_the_joints_and_is_hidden_in_a_gap() {
     let mut trial = walker(3);
     trial.slots[1].points[0] = Err(Gap("implausible".into()));
     trial.slots[2].points.clear();
@@ -154,7 +154,7 @@ fn the_skin_reaches_from_joint_to_joint_and_is_not_there_in_a_gap() {
 }
 
 #[test]
-fn keypoints_are_marks_of_their_own() {
+fn extra_keypoints_have_separate_marks() {
     let mut trial = walker(3);
     trial.extras.push("nose".to_owned());
     for slot in &mut trial.slots {

@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_what_was_found_and_what_is_not_to_be_used() {
+    fn the_clock_page_shows_results_and_rejected_offsets() {
         let doubt = Doubt::NoPeople {
             camera: 1,
             seen_s: 0.0,

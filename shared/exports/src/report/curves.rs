@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn curves_are_drawn_from_the_first_pass_to_the_last_and_the_best_is_marked() {
+    fn curves_cover_all_passes_and_the_best_pass_is_marked() {
         let line = |name, values: [f64; 3]| Line {
             name,
             values: values.to_vec(),
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn no_passes_give_no_curves() {
+    fn without_passes_no_curves_are_drawn() {
         let nothing = Panel {
             what: "loss",
             lines: vec![],

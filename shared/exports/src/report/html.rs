@@ -162,7 +162,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_text_leaves_its_place(text: String) {
+        fn text_cannot_break_out_of_its_element(text: String) {
             let value = json!({ "text": text });
             let script = Html::in_script(&value).into_page();
             prop_assert!(!script.contains('<'));
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn text_means_itself_and_markup_is_markup() {
+    fn text_is_escaped_and_markup_is_not() {
         let text = html!("{}", "<a href=\"x\">&");
         assert_eq!(
             text.clone().into_page(),
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_write_with_these_macros_only() {
+    fn pages_are_written_only_with_these_macros() {
         let pages = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/report");
         let mut folders: Vec<PathBuf> = vec![pages];
         let own = folders[0].join("html.rs");

@@ -268,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_cannot_break_the_page_and_reasons_stand_on_it() {
+    fn names_are_escaped_and_reasons_are_shown() {
         let outcome = people::Outcome {
             cameras: Vec::new(),
             up: None,

@@ -18,7 +18,7 @@ fn gathered(lines: &[FrameLine], rate_hz: Option<f64>) -> Result<Trial, TrialErr
 }
 
 #[test]
-fn every_person_has_a_trial_and_all_have_the_same_places() {
+fn every_person_has_a_trial_and_all_trials_have_the_same_times() {
     let lines = [0, 1, 2, 3].map(|frame| {
         let mut line = line(frame, Some(30.0));
         let other = PersonLine {
@@ -57,7 +57,7 @@ fn every_person_has_a_trial_and_all_have_the_same_places() {
 }
 
 #[test]
-fn one_after_the_other_is_one_trial_with_both_identities() {
+fn people_followed_one_after_the_other_form_one_trial_with_both_ids() {
     let lines = [0, 1, 2].map(|frame| {
         let mut line = line(frame, Some(30.0));
         match frame {
@@ -81,7 +81,7 @@ fn one_after_the_other_is_one_trial_with_both_identities() {
 }
 
 #[test]
-fn frames_take_their_places_and_those_that_are_missing_are_gaps() {
+fn frames_are_placed_on_a_time_grid_and_missing_ones_are_gaps() {
     let frames = [9, 3, 5, 13].map(|i| line(i, Some(60.0)));
     let trial = gathered(&frames, None).unwrap();
     assert_eq!((trial.first_frame, trial.frame_step), (3, 2));
@@ -94,7 +94,7 @@ fn frames_take_their_places_and_those_that_are_missing_are_gaps() {
 }
 
 #[test]
-fn refused_joints_and_numbers_that_are_none_are_gaps() {
+fn refused_joints_and_invalid_numbers_are_gaps() {
     let mut one = line(0, None);
     let mut joints = one.people[0].joints.values_mut();
     *joints.next().unwrap() = JointLine::Missing {
@@ -115,7 +115,7 @@ fn refused_joints_and_numbers_that_are_none_are_gaps() {
 }
 
 #[test]
-fn times_off_the_grid_and_frames_twice_are_counted() {
+fn irregular_times_and_repeated_frames_are_counted() {
     let mut late = line(2, Some(30.0));
     late.time_s = Some(0.08);
     let lines = [0, 1, 3, 3, 4].map(|i| line(i, Some(30.0)));
@@ -125,7 +125,7 @@ fn times_off_the_grid_and_frames_twice_are_counted() {
 }
 
 #[test]
-fn what_holds_nothing_is_refused() {
+fn runs_without_poses_are_refused() {
     assert_eq!(gathered(&[], None), Err(TrialError::Empty));
     let mut empty = line(0, None);
     empty.people[0].joints.clear();
@@ -150,7 +150,7 @@ fn what_holds_nothing_is_refused() {
 }
 
 #[test]
-fn one_frame_has_a_rate_only_if_its_time_tells() {
+fn a_single_frame_has_a_rate_only_if_its_time_determines_it() {
     assert_eq!(
         gathered(&[line(0, Some(30.0))], None).unwrap().rate_hz,
         None
@@ -162,7 +162,7 @@ fn one_frame_has_a_rate_only_if_its_time_tells() {
 }
 
 #[test]
-fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
+fn filled_gaps_are_marked_in_every_format_that_supports_it() {
     let mut all = Gathering::new(Vec::new());
     let states = ["measured", "filled", "rejected", "exchanged"];
     for (frame, state) in (0..).zip(states) {
@@ -180,7 +180,7 @@ fn what_smoothing_has_filled_in_is_marked_in_every_format_that_can() {
 }
 
 #[test]
-fn keypoints_that_come_later_are_gaps_before() {
+fn keypoints_that_appear_later_are_gaps_before_that() {
     let mut second = line(11, Some(30.0));
     let nose = second.people[0].joints["head"].clone();
     second.people[0].keypoints.insert("nose, \"tip\"".to_owned(), nose);

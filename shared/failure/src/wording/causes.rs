@@ -33,7 +33,7 @@ mod tests {
     struct Inner;
 
     #[test]
-    fn the_causes_follow_in_order() {
+    fn causes_are_listed_in_order() {
         let error = Outer(Inner);
         assert_eq!(chain(&error).count(), 2);
         assert_eq!(

@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_is_read_bit_for_bit() {
+    fn a_written_model_is_read_back_bit_for_bit() {
         let mut named = planted::three_parts();
         named.mirror = Some(vec![0, 2, 1]);
         named.filters[0].weights[0] = f64::MIN_POSITIVE;
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn says_what_is_wrong_with_the_header() {
+    fn errors_of_the_header_name_the_problem() {
         let mut bytes = bytes();
         let n = bytes.len();
         assert_eq!(

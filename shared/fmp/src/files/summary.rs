@@ -134,7 +134,7 @@ mod tests {
     use crate::files::planted;
 
     #[test]
-    fn sums_up_what_was_planted() {
+    fn the_summary_matches_the_planted_model() {
         let summary = describe(&Model::new(planted::three_parts()).unwrap());
         assert_eq!(summary.n_filters, 6);
         assert_eq!(summary.filter_sizes, [[2, 2]]);
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_root_alone_has_no_ranges() {
+    fn a_model_with_only_a_root_has_no_ranges() {
         let mut spec = planted::three_parts();
         spec.parts.truncate(1);
         let summary = describe(&Model::new(spec).unwrap());

@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn every_type_of_the_parent_goes_with_some_type_of_the_child() {
+    fn every_type_of_the_parent_is_compatible_with_some_type_of_the_child() {
         let never = f64::NEG_INFINITY;
         assert_eq!(
             outcome(|model| edge(model, 1).bias[1] = vec![never, 0.5]),
@@ -472,7 +472,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mirror_exchanges_parts_in_pairs_and_keeps_the_tree() {
+    fn the_mirror_swaps_parts_in_pairs_and_keeps_the_tree() {
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![1, 2, 0])),
             "part 1 mirrors part 2, but part 2 does not mirror it, or the tree differs"

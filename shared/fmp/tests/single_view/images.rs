@@ -209,7 +209,7 @@ fn extractor_and_solver_give_the_result_of_the_reference() {
 }
 
 #[test]
-fn threads_instruction_sets_and_earlier_images_change_nothing() {
+fn threads_and_instruction_sets_and_earlier_images_do_not_change_the_result() {
     let data = picture(SIZE, AT);
     let model = planted(SIZE, AT, &data);
     let want = find(&model, SIZE, &data);

@@ -93,7 +93,7 @@ proptest! {
 proptest! {
     /// The best pose loses the maximum allowed amount on one part.
     #[test]
-    fn a_term_may_lose_all_of_the_slack(
+    fn a_bound_stays_correct_if_a_term_uses_all_of_its_slack(
         seed in any::<u64>(),
         offset in prop_oneof![Just(0.0_f32), -1e4..1e4_f32],
         part in 0..6_usize,

@@ -130,7 +130,7 @@ proptest! {
 
     /// Plain sums of equal features are bit-identical, so equal sums show that the features are equal.
     #[test]
-    fn a_scope_has_the_features_of_the_whole_image(
+    fn features_in_a_scope_equal_those_of_the_whole_image(
         size in [90..230_usize, 90..200_usize],
         interval in 1..5_usize,
         cell in 0..3_usize,
@@ -154,7 +154,7 @@ proptest! {
     }
 
     #[test]
-    fn levels_of_the_whole_image_have_the_bits_of_the_full_search(
+    fn a_scope_over_whole_levels_equals_the_full_search_bit_for_bit(
         size in [90..160_usize, 90..160_usize],
         cell_px in 2..6_usize,
         levels in [0.0..1.0_f64, 0.0..1.0],
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn a_window_has_every_cell_whose_centre_lies_in_the_region(shares in shares(), seed: u64) {
+    fn a_window_contains_every_cell_whose_centre_lies_in_the_region(shares in shares(), seed: u64) {
         let model = model(&mut Noise(seed), 4, 3);
         let layout = Layout::new(&model, 150, 170).unwrap();
         let scope = scope(&layout, shares);
@@ -256,7 +256,7 @@ proptest! {
 }
 
 #[test]
-fn refuses_what_is_not_on_the_layout() {
+fn refuses_scopes_outside_of_the_layout() {
     let model = model(&mut Noise(1), 4, 3);
     let layout = Layout::new(&model, 100, 120).unwrap();
     let region = Region {

@@ -100,7 +100,7 @@ proptest! {
     }
 
     #[test]
-    fn threads_and_instruction_sets_change_nothing(seed in any::<u64>()) {
+    fn threads_and_instruction_sets_do_not_change_the_result(seed in any::<u64>()) {
         let mut noise = Noise(seed);
         let model = tree(&mut noise, 5);
         let evidence = Evidence::new(&mut noise, &model, &[[9, 20], [17, 7], [4, 35], [1, 1]]);
@@ -155,7 +155,7 @@ proptest! {
     }
 
     #[test]
-    fn distinct_poses_are_a_greedy_choice_that_begins_with_the_best(
+    fn distinct_poses_are_chosen_greedily_from_the_best(
         seed in any::<u64>(),
         separation in 0.0..3.0_f64,
     ) {
@@ -219,7 +219,7 @@ fn ties_go_to_the_lower_level_then_to_the_first_cell() {
 }
 
 #[test]
-fn only_levels_that_are_offered_and_asked_for_are_searched() {
+fn only_available_and_requested_levels_are_searched() {
     let mut noise = Noise(2);
     let model = tree(&mut noise, 3);
     let evidence = Evidence::new(&mut noise, &model, &[[5, 5], [4, 4], [3, 3]]);

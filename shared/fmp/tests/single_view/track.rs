@@ -78,7 +78,7 @@ fn without_settings_every_frame_is_searched_in_full() {
 }
 
 #[test]
-fn the_first_frame_and_then_every_so_many_are_searched_in_full() {
+fn the_first_frame_and_every_nth_frame_are_searched_in_full() {
     let mut scene = Scene::new(Some(TRACK));
     let full: Vec<u64> = (7..30).filter(|&i| scene.is_full(i, Some(1.0))).collect();
     assert_eq!(full, [7, 12, 17, 22, 27]);
@@ -95,7 +95,7 @@ fn a_frame_without_a_pose_is_searched_in_full_and_so_is_the_next() {
 
 /// At one frame per second, the person can be anywhere in the next frame.
 #[test]
-fn at_low_rates_every_frame_is_searched_in_full_and_at_others_twice_a_second() {
+fn at_low_rates_every_frame_is_searched_in_full_and_otherwise_two_per_second() {
     assert_eq!(Scene::full_at(1.0), (0..10).collect::<Vec<_>>());
     assert_eq!(Scene::full_at(3.9), (0..10).collect::<Vec<_>>());
     assert_eq!(Scene::full_at(5.0), [0, 3, 6, 9]);
@@ -144,7 +144,7 @@ fn a_frame_after_a_gap_or_out_of_order_is_searched_in_full() {
 }
 
 #[test]
-fn a_fallen_score_makes_the_same_frame_be_searched_in_full() {
+fn a_drop_of_the_score_triggers_a_full_search_of_the_same_frame() {
     let mut scene = Scene::new(Some(TRACK));
     // A gradual drop of the score causes a full search as well; its result is the new reference.
     let scores = [1.0, 0.875, 0.75, 0.625, 0.5, 0.375];

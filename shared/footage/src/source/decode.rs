@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_one_size_behind_one_another_are_a_stream() {
+    fn concatenated_pictures_of_one_size_are_a_stream() {
         let (one, small) = (jpeg(32, 16), jpeg(16, 8));
         let cut = one[..one.len() - 8].to_vec();
         for stream in [
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_that_are_not_used_are_told_by_the_largest_value() {
+    fn unused_bits_are_detected_from_the_largest_value() {
         let bits = |brightest| Depth::of(brightest).map(|depth| depth.bits);
         assert_eq!(
             [200, 1023, 4000, 16_000].map(bits),

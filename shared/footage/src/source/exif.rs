@@ -151,7 +151,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn damaged_files_are_no_panic(
+        fn damaged_files_do_not_panic(
             is_png in any::<bool>(),
             at in 0_usize..200,
             value in any::<u8>(),

@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn only_a_percent_sign_digits_and_d_are_a_numbered_pattern() {
+    fn only_a_percent_sign_with_digits_and_d_is_a_numbered_pattern() {
         let parse =
             |name| Numbered::parse(Path::new(name)).map(|value| (value.prefix, value.suffix));
         assert_eq!(parse("x/im%05d.png"), Some(("im", ".png")));

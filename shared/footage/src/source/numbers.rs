@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_that_rises_is_that_of_the_frame() {
+    fn the_number_that_increases_is_the_frame_number() {
         assert_eq!(numbers(&["000000.jpg", "000007.jpg"]), Some(vec![0, 7]));
         assert_eq!(numbers(&["im9.png", "im10.png"]), Some(vec![9, 10]));
         assert_eq!(
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_count_by_common_numbers_or_by_their_own() {
+    fn cameras_share_frame_numbers_or_each_has_its_own() {
         let range = |range: core::ops::Range<u64>| range.collect::<Vec<u64>>();
         let common = |first, step| Counting::Common(PictureNumbers { first, step });
         let gap: Vec<u64> = (0..14).filter(|i| !(3..6).contains(i)).collect();

@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_password_that_is_repeated_alone_is_hidden_too() {
+    fn a_repeated_password_without_address_is_hidden_too() {
         let hidden = |message: &str| without_password_of("rtsp://me:secret@10.0.0.5/a", message);
         assert_eq!(hidden("auth me:secret failed"), "auth *** failed");
         assert_eq!(
@@ -135,7 +135,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_has_no_password_stays(text in "[a-z /.:@-]{0,40}") {
+        fn addresses_without_a_password_are_unchanged(text in "[a-z /.:@-]{0,40}") {
             prop_assume!(!text.contains("://"));
             prop_assert_eq!(without_passwords(&text), text);
         }

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_is_read_by_the_clock_of_the_pictures() {
+    fn sound_has_the_time_base_of_the_pictures() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["tone.mkv", "tone.mp4"] {
             let path = folder.path().join(name);
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn images_have_no_sound_and_what_is_no_video_is_refused() {
+    fn images_have_no_sound_and_files_that_are_not_videos_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let image = folder.path().join("000.png");
         image::RgbImage::new(4, 4).save(&image).unwrap();

@@ -421,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn times_of_streams_come_before_pixels_as_well() {
+    fn stream_options_write_the_times_before_the_pixels() {
         assert!(comes_before(
             &crate::stream::outputs("5.1"),
             "framecrc",

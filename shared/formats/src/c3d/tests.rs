@@ -80,7 +80,7 @@ fn unknown_units_have_no_length() {
 }
 
 #[test]
-fn an_empty_file_is_short() {
+fn an_empty_file_is_reported_as_too_short() {
     let got = C3d::parse(&[]);
     assert!(
         matches!(got, Err(C3dError::Short { got: 0, .. })),
@@ -135,7 +135,7 @@ fn a_parameter_of_an_unknown_kind_is_refused() {
 }
 
 #[test]
-fn a_link_out_of_the_section_is_ignored() {
+fn a_link_beyond_its_section_is_ignored() {
     // The link of USED follows the header, the group and its own name.
     let got = with(512 + 4 + 10 + 6, &[0xff, 0x7f]).unwrap();
     assert_eq!(got.labels(), trial().labels);
@@ -143,7 +143,7 @@ fn a_link_out_of_the_section_is_ignored() {
 
 proptest! {
     #[test]
-    fn a_written_trial_is_read_back(
+    fn a_written_c3d_trial_is_read_back(
         points in prop::collection::vec(prop::option::of(prop::array::uniform3(-3000..3000_i32)), 12),
         n_analog in 0..5_u16,
     ) {
@@ -184,7 +184,7 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+    fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         drop(C3d::parse(&bytes));
         let mut marked = bytes;
         if marked.len() > 515 {

@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn another_kind_or_version_is_refused_with_what_was_expected() {
+    fn another_kind_or_version_is_refused_with_the_expected_one() {
         let other = Envelope {
             magic: *b"PLXOTHER",
             ..KIND
@@ -146,7 +146,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_payload_is_read_as_it_was_written(payload: Vec<u8>) {
+        fn any_payload_survives_a_round_trip(payload: Vec<u8>) {
             let file = KIND.seal(&payload);
             prop_assert_eq!(KIND.open(&file), Ok(&payload[..]));
         }

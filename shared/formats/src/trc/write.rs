@@ -80,7 +80,7 @@ mod tests {
     use crate::trc::Trc;
 
     #[test]
-    fn every_row_has_all_cells_whatever_is_missing() {
+    fn every_row_has_all_cells_even_if_values_are_missing() {
         for points in [[None; 3], [Some([1.0; 3]), Some([2.0; 3]), None]] {
             let text = row(7, 0.1, points);
             let cells: Vec<&str> = text.trim_end_matches('\n').split('\t').collect();
@@ -92,7 +92,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_was_written_is_read_to_a_millionth(
+        fn written_values_are_read_back_to_a_millionth(
             frames in prop::collection::vec(
                 prop::collection::vec(prop::option::of(prop::array::uniform3(-1e3..1e3_f64)), 3),
                 0..5,

@@ -87,7 +87,7 @@ impl Room {
 }
 
 #[test]
-fn offsets_are_found_as_far_as_the_way_of_the_sound_allows() {
+fn offsets_are_found_within_the_travel_time_of_the_sound() {
     let mut errors = Vec::new();
     for seed in 0..20 {
         let (room, mut random) = Room::drawn(seed, 40.0, 25);
@@ -110,7 +110,7 @@ fn offsets_are_found_as_far_as_the_way_of_the_sound_allows() {
 }
 
 #[test]
-fn a_clock_that_drifts_is_told() {
+fn a_drifting_clock_is_detected() {
     let (mut room, mut random) = Room::drawn(3, 300.0, 300);
     room.drifts = vec![0.0, 120e-6, -80e-6, 0.0];
     let sounds = room.record(&mut random);
@@ -130,7 +130,7 @@ fn a_clock_that_drifts_is_told() {
 }
 
 #[test]
-fn what_tells_nothing_is_refused() {
+fn silence_and_sounds_of_another_room_are_refused() {
     let (room, mut random) = Room::drawn(5, 30.0, 20);
     let (other, mut other_random) = Room::drawn(6, 30.0, 20);
     let settings = room.settings();
@@ -177,7 +177,7 @@ fn what_tells_nothing_is_refused() {
 }
 
 #[test]
-fn noise_alone_is_never_taken_for_sounds() {
+fn noise_alone_is_never_taken_for_a_common_sound() {
     for seed in 0..30 {
         let (room, mut random) = Room::drawn(seed, 30.0, 0);
         let sounds = room.record(&mut random);
@@ -187,7 +187,7 @@ fn noise_alone_is_never_taken_for_sounds() {
 }
 
 #[test]
-fn different_rooms_never_match() {
+fn sounds_from_different_rooms_never_match() {
     for seed in 0..30 {
         let (room, mut random) = Room::drawn(seed, 40.0, 5 + seed as usize);
         let mut sounds = room.record(&mut random);

@@ -53,7 +53,7 @@ fn outcome(doubts: Vec<Doubt>) -> Outcome {
 }
 
 #[test]
-fn the_page_says_what_is_known_and_what_is_not_to_be_trusted() {
+fn the_calibration_page_shows_results_and_warnings() {
     let names = ["<left>".to_owned(), "right".to_owned()];
     let page = |outcome: &Outcome, more: &[String]| {
         html(&Page {

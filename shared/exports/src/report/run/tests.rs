@@ -65,7 +65,7 @@ fn page() -> Page {
 }
 
 #[test]
-fn the_page_asks_for_nothing_outside_itself() {
+fn the_page_loads_nothing_external() {
     let html = html(&page());
     for outside in ["http:", "https:", "url(", "@import", "<link", "<iframe"] {
         assert!(!html.contains(outside), "{outside}");
@@ -79,7 +79,7 @@ fn the_page_asks_for_nothing_outside_itself() {
 }
 
 #[test]
-fn the_data_of_the_script_is_what_was_found_in_millimetres() {
+fn the_data_of_the_script_are_the_joints_in_millimetres() {
     let html = html(&page());
     let begin = html.find("id=\"data\">").unwrap() + 10;
     let end = begin + html[begin..].find("</script>").unwrap();
@@ -96,7 +96,7 @@ fn the_data_of_the_script_is_what_was_found_in_millimetres() {
 }
 
 #[test]
-fn a_missed_limit_is_said_at_the_top_and_in_its_row() {
+fn a_missed_limit_is_shown_at_the_top_and_in_its_row() {
     let missed = html(&page());
     assert!(missed.contains("1 of 2 limits missed"));
     assert_eq!(missed.matches("<td class=\"missed\">").count(), 1);
@@ -106,7 +106,7 @@ fn a_missed_limit_is_said_at_the_top_and_in_its_row() {
 }
 
 #[test]
-fn a_view_that_was_not_there_is_seen_in_the_timeline_and_among_the_pictures() {
+fn an_absent_view_is_shown_in_the_timeline_and_among_the_pictures() {
     let html = html(&page());
     assert_eq!(html.matches("class=\"there\"").count(), 3);
     assert_eq!(html.matches("class=\"gone\"").count(), 1);
@@ -115,7 +115,7 @@ fn a_view_that_was_not_there_is_seen_in_the_timeline_and_among_the_pictures() {
 }
 
 #[test]
-fn the_script_finds_every_element_that_it_asks_for() {
+fn every_element_that_the_script_uses_exists() {
     let html = html(&page());
     let asked = SCRIPT.split("element(\"").skip(1);
     let names = asked.map(|rest| rest.split('"').next().unwrap());
@@ -125,7 +125,7 @@ fn the_script_finds_every_element_that_it_asks_for() {
 }
 
 #[test]
-fn what_happened_is_seen_before_what_was_asked_and_no_row_is_empty() {
+fn events_are_shown_before_settings_and_no_row_is_empty() {
     let html = html(&page());
     let at = |what: &str| html.find(what).unwrap();
     assert!(at("class=\"verdict") < at("<canvas") && at("<canvas") < at("<h2>Limits"));
@@ -138,7 +138,7 @@ fn what_happened_is_seen_before_what_was_asked_and_no_row_is_empty() {
 }
 
 #[test]
-fn the_page_is_dark_where_its_reader_wants_that_and_scrolls_what_is_wide() {
+fn the_page_follows_the_dark_mode_of_the_browser_and_wide_parts_scroll() {
     let dark = STYLE.split("prefers-color-scheme: dark").nth(1).unwrap();
     let dark = &dark[..dark.find("}\n}").unwrap()];
     for colour in STYLE[..STYLE.find('}').unwrap()].split("--").skip(1) {
@@ -165,7 +165,7 @@ fn the_page_is_dark_where_its_reader_wants_that_and_scrolls_what_is_wide() {
 }
 
 #[test]
-fn nothing_is_wider_than_a_telephone() {
+fn no_element_is_wider_than_a_telephone_screen() {
     let folder = tempfile::tempdir().unwrap();
     let mut page = page();
     page.lead = "capture-0, ".repeat(40) + &"x".repeat(200);

@@ -57,7 +57,7 @@ fn reads_both_releases_compressed_or_not() {
 }
 
 #[test]
-fn a_part_with_one_type_reads_alike_in_both_releases() {
+fn a_part_with_one_type_is_read_the_same_from_both_releases() {
     let mut spec = three_parts();
     spec.parts[1].filter_of_type.truncate(1);
     let edge = spec.parts[1].edge.as_mut().unwrap();

@@ -18,7 +18,7 @@ fn outcome(text: &str) -> String {
 }
 
 #[test]
-fn reads_what_was_planted() {
+fn reads_the_planted_model() {
     assert_eq!(parse(&text()).unwrap(), planted::three_parts());
 }
 

@@ -51,7 +51,7 @@ fn more_frames_than_16_bits_count_are_read_back() {
 
 /// `ezc3d` does not accept a real number here.
 #[test]
-fn the_number_of_frames_is_a_whole_number() {
+fn the_number_of_frames_is_written_as_an_integer() {
     for n_frames in [1, 70_000] {
         let bytes = section(&heading(&names(1), n_frames), 3);
         let at = bytes.windows(8).position(|window| window == b"\x06\x01FRAMES");
@@ -63,7 +63,7 @@ fn the_number_of_frames_is_a_whole_number() {
 }
 
 #[test]
-fn names_beyond_the_format_are_cut_counted_on_or_refused() {
+fn names_beyond_the_limits_are_cut_or_continued_or_refused() {
     let mut labels = names(300);
     labels[0] = "\u{3b1},\u{e9}\"".to_owned() + &"x".repeat(200);
     let mut file = Vec::new();
@@ -83,7 +83,7 @@ fn names_beyond_the_format_are_cut_counted_on_or_refused() {
 }
 
 #[test]
-fn what_was_not_announced_is_refused() {
+fn an_unannounced_number_of_points_or_frames_is_refused() {
     let labels = names(2);
     let error = write(&mut Vec::new(), &heading(&labels, 2), [vec![None, None]]).unwrap_err();
     assert!(error.to_string().contains("1 frames, 2"), "{error}");
@@ -108,7 +108,7 @@ fn cameras_and_residual_share_the_fourth_number() {
 
 proptest! {
     #[test]
-    fn what_was_written_is_read_back(
+    fn written_data_is_read_back(
         frames in prop::collection::vec(
             prop::collection::vec(prop::option::of(prop::array::uniform3(-1e5..1e5_f64)), 3),
             1..20,
