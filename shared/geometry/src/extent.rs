@@ -16,7 +16,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_the_width_or_the_height_whichever_is_longer() {
+    fn the_extent_is_the_longer_of_width_and_height() {
         let side = |points: &[[f64; 2]]| longer_side(points.iter().copied());
         assert_eq!(side(&[[1.0, 5.0], [4.0, 6.0], [2.0, -3.0]]), Some(9.0));
         assert_eq!(side(&[[1.0, 5.0], [14.0, 6.0]]), Some(13.0));

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_is_moved_back_by_its_own_velocity() {
+    fn a_point_is_moved_back_to_the_instant_by_its_velocity() {
         let mut tracks = Tracks::default();
         tracks.note(1.0, at(100.0));
         let now = Point2::new(110.0, 7.0);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn another_point_has_no_velocity() {
+    fn a_point_that_jumps_has_no_velocity() {
         let mut tracks = Tracks::default();
         assert_eq!(speed(&tracks, 1.0, 0.0), None);
         tracks.note(0.9, at(98.0));
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_goes_back_begins_anew() {
+    fn a_clock_that_goes_back_resets_the_velocity() {
         let mut tracks = Tracks::default();
         tracks.note(5.0, at(0.0));
         tracks.note(1.0, at(100.0));

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_square_of_cameras_measures_as_it_was_built() {
+    fn the_survey_of_a_square_of_cameras_gives_its_dimensions() {
         let survey = survey(&square());
         let close = |got: f64, expected: f64| assert!((got - expected).abs() < 1e-9, "{got}");
         for place in &survey.cameras {
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shared_space_is_what_all_cameras_see() {
+    fn the_shared_space_is_the_space_that_all_cameras_see() {
         let shared = survey(&square()).shared.unwrap();
         // At the centre a view is 3.6 m wide and 2.7 m high.
         assert!((1.5..=3.0).contains(&shared.sides_m[2]), "{shared:?}");

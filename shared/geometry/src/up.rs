@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_up_becomes_the_axis_that_is_asked_for() {
+    fn any_up_direction_is_rotated_to_the_requested_axis() {
         for up in [
             [0.0, 0.0, 1.0],
             [0.0, -1.0, 0.0],

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loops_in_loops_are_expanded() {
+    fn nested_loops_are_expanded() {
         let text = "a; @unroll i 0 2 1 { b[$i]; @unroll j 4 9 4 { c[$i + $j]; } } d;";
         let words: Vec<String> = expand(text).split_whitespace().map(str::to_owned).collect();
         let expected =

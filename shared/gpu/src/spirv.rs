@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_sum_and_product_is_decorated() {
+    fn every_sum_and_product_is_decorated_against_contraction() {
         let text = "@group(0) @binding(0) var<storage, read_write> x: array<f32>;
             @compute @workgroup_size(1) fn main() { x[0] = x[0] * x[1] + x[2] - x[3]; }";
         let words = from_wgsl(text).unwrap();

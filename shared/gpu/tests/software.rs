@@ -136,7 +136,7 @@ impl Case {
 }
 
 #[test]
-fn features_have_the_bits_of_the_cpu() {
+fn features_equal_those_of_the_cpu_bit_for_bit() {
     let Some(device) = device() else { return };
     let case = Case::new(&mut Rng::with_seed(1), [2, 1, 5]);
     let found = case.view(&device).unwrap().features(case.image()).unwrap();
@@ -151,7 +151,7 @@ fn features_have_the_bits_of_the_cpu() {
 }
 
 #[test]
-fn of_equal_responses_poses_scores_and_bounds_have_the_bits_of_the_cpu() {
+fn with_equal_responses_poses_scores_and_bounds_equal_those_of_the_cpu_bit_for_bit() {
     let Some(device) = device() else { return };
     let mut rng = Rng::with_seed(2);
     for shape in [[1, 1, 1], [4, 3, 2], [9, 2, 3], [6, 8, 1], [26, 6, 5]] {
@@ -173,7 +173,7 @@ fn of_equal_responses_poses_scores_and_bounds_have_the_bits_of_the_cpu() {
 }
 
 #[test]
-fn a_search_gives_evidence_and_the_poses_that_are_in_it() {
+fn a_search_returns_evidence_and_the_poses_found_in_it() {
     let Some(device) = device() else { return };
     let case = Case::new(&mut Rng::with_seed(3), [5, 3, 5]);
     let view = case.view(&device).unwrap();
@@ -209,7 +209,7 @@ fn a_search_gives_evidence_and_the_poses_that_are_in_it() {
 }
 
 #[test]
-fn the_model_that_ships_is_one_for_the_gpu() {
+fn the_included_model_runs_on_the_gpu() {
     let Some(device) = device() else { return };
     let file = concat!(
         env!("CARGO_MANIFEST_DIR"),
@@ -225,7 +225,7 @@ fn the_model_that_ships_is_one_for_the_gpu() {
 }
 
 #[test]
-fn a_device_that_sees_little_at_once_finds_the_same() {
+fn a_device_with_small_buffers_gives_the_same_result() {
     let (Some(device), Some(small)) = (device(), opened()) else {
         return;
     };
@@ -243,7 +243,7 @@ fn a_device_that_sees_little_at_once_finds_the_same() {
 }
 
 #[test]
-fn a_driver_that_takes_no_spirv_finds_the_same_poses() {
+fn a_driver_without_spirv_support_gives_the_same_poses() {
     let Some(device) = opened() else { return };
     let device = Arc::new(device.without_spirv());
     let case = Case::new(&mut Rng::with_seed(9), [6, 3, 5]);
@@ -255,7 +255,7 @@ fn a_driver_that_takes_no_spirv_finds_the_same_poses() {
 }
 
 #[test]
-fn a_device_that_sees_too_little_is_refused() {
+fn a_device_whose_buffers_are_too_small_is_refused() {
     let Some(small) = opened() else { return };
     let small = Arc::new(small.with_max_binding(10_000));
     let case = Case::new(&mut Rng::with_seed(5), [26, 6, 3]);
@@ -267,7 +267,7 @@ fn a_device_that_sees_too_little_is_refused() {
 }
 
 #[test]
-fn a_lost_device_is_an_error_and_no_panic() {
+fn a_lost_device_is_an_error_instead_of_a_panic() {
     let Some(device) = opened().map(Arc::new) else {
         return;
     };
@@ -285,7 +285,7 @@ fn a_lost_device_is_an_error_and_no_panic() {
 }
 
 #[test]
-fn models_of_another_kind_are_the_cpus() {
+fn unsupported_models_are_left_to_the_cpu() {
     let Some(device) = device() else { return };
     let refusal = |change: &dyn Fn(&mut ModelSpec)| {
         let mut spec = spec(&mut Rng::with_seed(7), [3, 2, 2]);

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_that_no_network_needs_are_refused_with_their_node() {
+    fn implausible_sizes_are_refused_with_their_node() {
         let large = 1_000_000_000;
         for (op, at) in [
             ("Pad", 1),

@@ -57,7 +57,7 @@ fn assert_like_rten(file: &[u8], shape: &[usize], seed: u32) -> RunBy {
 }
 
 #[test]
-fn the_network_that_ships_is_run_by_parallax_and_gives_what_rten_gives() {
+fn the_included_network_runs_in_parallax_and_gives_the_results_of_rten() {
     for seed in 0..3 {
         let by = assert_like_rten(SHIPPED, &[1, 3, 160, 128], seed);
         assert_eq!(by, RunBy::Parallax);
@@ -65,7 +65,7 @@ fn the_network_that_ships_is_run_by_parallax_and_gives_what_rten_gives() {
 }
 
 #[test]
-fn several_pictures_at_once_go_by_rten() {
+fn batches_of_pictures_are_run_by_rten() {
     let session = Session::parse(SHIPPED.to_vec()).unwrap();
     let outputs = run(&session, &[2, 3, 160, 128], 1).unwrap();
     assert_eq!(outputs[0].len(), 2 * 14 * 40 * 32);
@@ -151,7 +151,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn other_networks_give_what_rten_gives(
+    fn other_networks_give_the_same_results_as_rten(
         inputs in 1..5_usize, narrow in 1..20_usize, wide in 1..40_usize,
         rows in 1..9_usize, cols in 1..9_usize, is_last_needed: bool, seed: u32,
     ) {
@@ -168,7 +168,7 @@ fn reason(file: &[u8]) -> String {
 }
 
 #[test]
-fn what_is_not_known_goes_by_rten_and_is_named() {
+fn networks_with_unknown_operations_are_run_by_rten_and_the_operation_is_named() {
     let mut net = Net::new([4, 6, 6]);
     net.conv("picture", "a", [4, 4], (3, 1));
     net.node("Sigmoid", &["a"], "b");
@@ -212,7 +212,7 @@ fn weights_that_do_not_fit_the_input_are_an_error() {
 }
 
 #[test]
-fn a_file_that_is_cut_off_is_refused() {
+fn a_truncated_network_file_is_refused() {
     let file = residual([3, 4, 5], [4, 4], true);
     for n in (0..file.len()).step_by(97) {
         // Loading a truncated file must never panic, but may succeed.

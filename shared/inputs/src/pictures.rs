@@ -221,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_searched_keeps_its_shape_and_is_never_enlarged() {
+    fn a_searched_picture_keeps_its_aspect_ratio_and_is_never_enlarged() {
         let bounded = |width, height, longest| bounded(Size::new(width, height), longest);
         assert_eq!(bounded(4000, 3000, Some(1280)), Size::new(1280, 960));
         assert_eq!(bounded(3000, 4000, Some(1280)), Size::new(960, 1280));

@@ -149,14 +149,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longer_side_is_that_of_all_thumbnails() {
+    fn all_thumbnails_have_the_same_longer_side() {
         assert_eq!(shrunk(Size::new(440, 100)), (Size::new(220, 50), 0.5));
         assert_eq!(shrunk(Size::new(11, 110)), (Size::new(22, 220), 2.0));
         assert_eq!(shrunk(Size::new(9000, 1)).0, Size::new(220, 1));
     }
 
     #[test]
-    fn several_pages_are_numbered_and_every_image_is_on_one() {
+    fn pages_are_numbered_and_every_image_is_on_exactly_one() {
         let dir = tempfile::tempdir().unwrap();
         let size = Size::new(20, 10);
         for (n_images, expected) in [(40, vec!["s.png"]), (41, vec!["s-1.png", "s-2.png"])] {
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_skeleton_is_drawn_where_it_is_in_the_image() {
+    fn the_skeleton_is_drawn_at_its_place_in_the_image() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("s.png");
         let mut sheet = Sheet::new(path.clone(), 1);

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shipped_file_is_of_its_kind() {
+    fn every_included_file_has_the_right_kind() {
         let model = fmp::files::own::decode(Shipped::Model.bytes()).unwrap();
         let n_parts = model.parts.len();
         viewquality::Network::parse(Shipped::Network.bytes().to_vec(), n_parts).unwrap();
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn shipped_files_are_known_by_their_content() {
+    fn included_files_are_recognised_by_their_content() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs");
         let network = folder.join("models/person.pose.onnx");
         assert_eq!(Shipped::of_file(&network), Some(Shipped::PoseNetwork));
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_joints_that_ship_belong_to_the_model_that_ships() {
+    fn the_included_joint_map_belongs_to_the_included_model() {
         let text = core::str::from_utf8(Shipped::Joints.bytes()).unwrap();
         let file = multiview::learned::JointFile::parse(text).unwrap();
         let model = formats::checksum::fnv1a(Shipped::Model.bytes());

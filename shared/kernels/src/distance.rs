@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fast_one_gives_the_bits_of_the_reference() {
+    fn the_fast_version_equals_the_reference_bit_for_bit() {
         let spring = LengthSpring {
             mean: 0.4,
             sd: 0.1,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn of_several_equally_good_points_the_first_is_best_and_nan_never() {
+    fn ties_go_to_the_first_point_and_nan_never_wins() {
         let spring = LengthSpring {
             mean: 1.0,
             sd: 1.0,

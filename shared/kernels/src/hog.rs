@@ -213,7 +213,7 @@ mod tests {
 
         /// Computes the features of two images one after the other, to test that no data of the first remain.
         #[test]
-        fn every_instruction_set_gives_the_bits_of_the_reference(
+        fn every_instruction_set_equals_the_reference_bit_for_bit(
             images in [all_images(), all_images()],
             shape in shapes(),
             misaligned in 0..16_usize,
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn padding_is_zero_but_for_its_own_channel() {
+    fn padding_is_zero_except_for_its_own_channel() {
         let map = hog_f64(&Planes::from_samples(16, 16, vec![9.0; 3 * 256]), SHAPE);
         let [rows, cols] = SHAPE.map_size(16, 16);
         assert_eq!([rows, cols], [2 + 6, 2 + 8]);

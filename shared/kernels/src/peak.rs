@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn more_rounds_are_more_operations() {
+    fn more_rounds_count_as_more_operations() {
         for isa in Isa::available() {
             for peak in [Peak::MultiplyAdd, Peak::MaxPlus] {
                 let [one, three] = [1, 3].map(|rounds| peak.run(isa, rounds));

@@ -261,7 +261,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_instruction_set_resizes_as_the_reference(
+        fn every_instruction_set_resizes_like_the_reference(
             size in [1..sized(70, 25), 1..sized(50, 15)],
             share in [0.0..1.0_f64, 0.0..1.0_f64],
             misaligned in 0..16_usize,
@@ -285,7 +285,7 @@ mod tests {
         }
 
         #[test]
-        fn a_part_of_a_smaller_image_has_the_bits_of_the_whole(
+        fn a_region_of_a_smaller_image_equals_the_same_region_of_the_whole_bit_for_bit(
             size in [1..70_usize, 1..50_usize],
             share in [0.1..1.0_f64, 0.1..1.0_f64],
             cut in [[0.0..1.0_f64, 0.0..1.0], [0.0..1.0, 0.0..1.0]],
@@ -315,7 +315,7 @@ mod tests {
         }
 
         #[test]
-        fn every_instruction_set_reduces_as_the_reference(
+        fn every_instruction_set_shrinks_like_the_reference(
             size in [5..sized(70, 25), 5..sized(30, 15)],
             seed in any::<u64>(),
         ) {
@@ -349,7 +349,7 @@ mod tests {
 
     /// The rows are so long that some samples are covered by less than a thousandth of their width, others by slightly more.
     #[test]
-    fn shares_about_a_thousandth_are_treated_as_in_the_reference() {
+    fn weights_near_a_thousandth_are_treated_like_in_the_reference() {
         let all = [(1030, 1029), (2003, 2001), (2001, 1009)];
         for (from, to) in all.into_iter().take(sized(3, 1)) {
             let bytes = noise(from as u64, 3 * from);

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_transposes_and_stores_parts_of_registers() {
+    fn every_instruction_set_transposes_and_stores_partial_registers() {
         for isa in Isa::available() {
             isa.run(Check);
         }
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_rounds_once_and_gives_the_second_of_equals() {
+    fn every_instruction_set_rounds_once_and_max_returns_the_second_operand_on_ties() {
         let a = 1.0 + f32::EPSILON;
         let sums = [a.mul_add(a, -3.0), a + 3.0, a - 3.0, a + f32::EPSILON / 2.0];
         let want = [sums.as_slice(), &[3.0, 3.0, a, a, -0.0, 0.0]].concat();
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_loads_anywhere_and_joins_registers() {
+    fn every_instruction_set_loads_unaligned_data_and_joins_registers() {
         for isa in Isa::available() {
             isa.run(Places);
         }

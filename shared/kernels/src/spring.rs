@@ -135,7 +135,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_child_outside_of_the_window_can_win(
+        fn no_child_outside_of_the_window_can_have_the_maximum(
             (n, p) in (1..60_usize).prop_flat_map(|n| (Just(n), 0..n)),
             (quadratic, linear) in (0.005..0.5, -0.5..0.5),
             anchor in -70..70_i32,
@@ -154,7 +154,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_offsets_of_a_block_are_those_of_all_its_windows(
+        fn the_offsets_of_a_block_cover_all_its_windows(
             (n, first, len) in (1..60_usize).prop_flat_map(|n| (Just(n), 0..n, 1..17_usize)),
             (quadratic, linear) in (0.005..0.5, -0.5..0.5),
             anchor in -70..70_i32,

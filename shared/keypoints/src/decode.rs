@@ -389,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn corner_cells_lie_on_corner_pixels_where_the_card_says_so() {
+    fn corner_cells_lie_on_corner_pixels_if_the_card_says_so() {
         let values = bump([11.0, 15.0], Layout::Planes);
         let maps = HeatMaps::new(&values, &[1, 2, 16, 12], Layout::Planes, [2, 0]).unwrap();
         let found = |udp| maps.keypoints([48, 64], udp, Refine::Quarter, Score::Share)[0].at;
@@ -398,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn further_maps_are_counted_and_not_read() {
+    fn maps_beyond_the_keypoints_are_counted_and_not_read() {
         let maps = |values, shape, layout| {
             let maps = HeatMaps::new(values, shape, layout, [1, 1]).unwrap();
             maps.keypoints([2, 1], false, Refine::None, Score::Share)
@@ -420,14 +420,14 @@ mod tests {
     }
 
     #[test]
-    fn log_odds_become_shares() {
+    fn log_odds_become_probabilities() {
         let maps = HeatMaps::new(&[0.0, 2.0], &[1, 1, 1, 2], Layout::Planes, [1, 0]).unwrap();
         let found = maps.keypoints([2, 1], false, Refine::None, Score::LogOdds)[0];
         assert!((found.score - 0.880_797).abs() < 1e-6);
     }
 
     #[test]
-    fn bins_of_columns_and_rows_give_a_place() {
+    fn maxima_of_column_and_row_bins_give_a_position() {
         let mut axes = [vec![0.0_f32; 2 * 8], vec![0.0; 2 * 12]];
         axes[0][8 + 5] = 0.7;
         axes[1][12 + 9] = 0.4;
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_is_read_by_its_fields() {
+    fn a_list_of_keypoints_is_read_by_its_fields() {
         let fields = [
             ListField::Y,
             ListField::X,

@@ -357,7 +357,7 @@ output = { codec = "yolox", strides = [16, 32] }
 "#;
 
     #[test]
-    fn boxes_of_grids_are_where_their_cells_say_and_the_surest_of_overlapping_ones_stays() {
+    fn boxes_of_a_grid_follow_from_their_cells_and_the_best_of_overlapping_boxes_is_kept() {
         let card = DetectorCard::parse(YOLOX).unwrap();
         // The output has grids of 4 by 2 and of 2 by 1 cells, and two classes.
         let mut values = vec![0.0_f32; 10 * 7];
@@ -377,7 +377,7 @@ output = { codec = "yolox", strides = [16, 32] }
     }
 
     #[test]
-    fn listed_boxes_are_taken_as_they_are() {
+    fn listed_boxes_are_used_unchanged() {
         let text = YOLOX.replace(
             r#"codec = "yolox", strides = [16, 32]"#,
             r#"codec = "list", boxes = "dets""#,
@@ -414,7 +414,7 @@ output = { codec = "yolox", strides = [16, 32] }
     }
 
     #[test]
-    fn the_cards_that_ship_are_read() {
+    fn the_included_cards_are_valid() {
         for (text, name) in [
             (
                 include_str!("../../../configs/detectors/yolox.toml"),
@@ -434,7 +434,7 @@ output = { codec = "yolox", strides = [16, 32] }
     }
 
     #[test]
-    fn a_picture_that_is_enlarged_is_bilinear() {
+    fn an_enlarged_picture_is_interpolated_bilinearly() {
         let card = DetectorCard::parse(YOLOX).unwrap();
         // Two by one pixels are enlarged to 64 by 32 pixels, so that the distance between their centres is half the input's width.
         let mut values = vec![f32::NAN; 3 * 64 * 32];
@@ -445,7 +445,7 @@ output = { codec = "yolox", strides = [16, 32] }
     }
 
     #[test]
-    fn a_picture_keeps_its_shape_and_the_rest_is_grey() {
+    fn a_picture_keeps_its_aspect_ratio_and_is_padded_with_grey() {
         let card = DetectorCard::parse(YOLOX).unwrap();
         let rgb: Vec<u8> = [10, 20, 30].repeat(64 * 64);
         let mut values = vec![f32::NAN; 3 * 64 * 32];

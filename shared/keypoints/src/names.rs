@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_a_set_differ_and_come_in_pairs() {
+    fn names_of_a_set_are_unique_and_have_left_and_right_pairs() {
         for (set, names) in SETS {
             for (nth, name) in names.iter().enumerate() {
                 assert!(!names[..nth].contains(name), "{set}: {name} twice");
@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn halpe_begins_as_coco_does_and_lsp_is_the_skeletons() {
+    fn halpe_begins_with_the_coco_keypoints_and_lsp_equals_the_skeleton() {
         assert_eq!(HALPE_26[..17], COCO_17);
         let joints = PARSE14.joints.iter().map(|joint| joint.name);
         let same = joints.zip(LSP_14).filter(|(a, b)| a == b).count();
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn keypoints_that_are_no_joints_are_extra() {
+    fn keypoints_that_are_not_joints_are_extra_keypoints() {
         let extra = |names: &[&'static str]| -> Vec<&str> {
             let names = names.iter().copied();
             names.filter(|name| !is_joint(name)).collect()
@@ -365,14 +365,14 @@ mod tests {
     }
 
     #[test]
-    fn a_name_with_a_side_has_one_on_the_other() {
+    fn every_name_with_a_side_has_a_counterpart() {
         assert_eq!(mirrored("left heel").as_deref(), Some("right heel"));
         assert_eq!(mirrored("right_hand_3").as_deref(), Some("left_hand_3"));
         assert_eq!(mirrored("nose"), None);
     }
 
     #[test]
-    fn a_head_without_a_top_lies_beyond_the_face() {
+    fn without_a_head_top_keypoint_the_head_is_estimated_from_the_face() {
         let rows = joint_rows(&owned(&COCO_17));
         // The face is at height 1.6, and the shoulders are at 1.4.
         let height = |keypoint: usize| if keypoint < 5 { 1.6 } else { 1.4 };
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_follows_from_one_ear_or_the_nose_alone_and_says_that_it_is_worse() {
+    fn a_head_estimated_from_one_ear_or_the_nose_has_a_larger_deviation() {
         let names = owned(&OPENPOSE_18);
         let ways = &joint_ways(&names)[13];
         let spread = |seen: &[&str]| {
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_no_keypoint_tells_is_missing() {
+    fn a_joint_without_keypoints_is_missing() {
         let rows = joint_rows(&owned(&["left hip", "nose"]));
         let known = PARSE14.joints.iter().zip(&rows).filter(|joint| joint.1.is_some());
         let known: Vec<&str> = known.map(|joint| joint.0.name).collect();

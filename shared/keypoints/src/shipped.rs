@@ -60,7 +60,7 @@ mod tests {
     use crate::{Card, DetectorCard, joint_rows};
 
     #[test]
-    fn every_card_is_read_and_says_where_all_joints_lie() {
+    fn every_included_card_is_valid_and_defines_all_joints() {
         for (name, text) in SHIPPED {
             let card = Card::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert!(
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn every_card_of_a_detector_is_read() {
+    fn every_included_detector_card_is_valid() {
         for (name, text) in SHIPPED_DETECTORS {
             let card = DetectorCard::parse(text).unwrap_or_else(|error| panic!("{name}: {error}"));
             assert!(

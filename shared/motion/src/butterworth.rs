@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn half_of_the_power_passes_at_the_cutoff_and_slow_movement_passes_whole() {
+    fn half_of_the_power_passes_at_the_cutoff_and_slow_movement_is_unchanged() {
         assert!(
             (passed(6.0) - 0.5_f64.sqrt()).abs() < 0.005,
             "{}",
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_line_stays_to_its_ends() {
+    fn a_straight_line_is_unchanged_up_to_its_ends() {
         let line: Vec<f64> = (0..50).map(|i| 0.3 * f64::from(i) - 2.0).collect();
         for (got, want) in twice(&line, 60.0, 6.0).iter().zip(&line) {
             assert!((got - want).abs() < 1e-2, "{got} {want}");

@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_late_track_is_late_by_that_much() {
+    fn the_delay_of_a_late_track_is_measured() {
         let times: Vec<f64> = (0..200).map(|i| f64::from(i) * 0.01).collect();
         let at = |t: f64| Some(Vector3::new((3.0 * t).sin(), (2.0 * t).cos(), 0.0));
         let truth: Vec<_> = times.iter().map(|&t| at(t)).collect();
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn instants_that_are_not_counted_are_passed_over() {
+    fn excluded_instants_are_ignored() {
         let times = [0.0, 0.1, 0.2, 0.3];
         let path = [
             Some(Vector3::zeros()),

@@ -167,7 +167,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn two_short_steps_are_one_long_one(a in 0.001..0.5_f64, b in 0.001..0.5_f64, jerk in 0.1..1e4_f64) {
+        fn two_short_prediction_steps_equal_one_long_step(a in 0.001..0.5_f64, b in 0.001..0.5_f64, jerk in 0.1..1e4_f64) {
             let once = start().after(a + b, jerk);
             let twice = start().after(a, jerk).after(b, jerk);
             prop_assert!((once.covariance - twice.covariance).norm() < 1e-9 * once.covariance.norm());
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_later_changes_nothing() {
+    fn smoothing_without_new_information_changes_nothing() {
         let before = start();
         let predicted = before.after(0.1, 10.0);
         let got = before.smoothed(&predicted, &predicted, 0.1);

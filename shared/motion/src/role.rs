@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_sides_of_a_name_are_each_others() {
+    fn left_and_right_roles_are_counterparts() {
         for name in [
             "left ankle",
             "right big toe",

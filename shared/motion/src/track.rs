@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_usual_covariance_stays_as_it_is() {
+    fn a_valid_covariance_is_unchanged() {
         let usual = Matrix3::new(4e-4, 1e-4, 0.0, 1e-4, 9e-4, 2e-5, 0.0, 2e-5, 1e-4);
         let (_, got) = usable(&measured([0.0; 3], Some(usual))).unwrap();
         assert!((got - usual).norm() < 1e-12);

@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_standing_person_is_told_from_its_mirror_image() {
+    fn a_standing_person_is_distinguished_from_the_mirror_image() {
         assert!(anatomical_evidence(&standing(), None) > 0.2);
         assert!(anatomical_evidence(&exchanged(&standing()), None) < -0.2);
     }
@@ -124,7 +124,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn exchanging_left_and_right_negates_it(offsets in prop::collection::vec(-0.1..0.1_f64, 42)) {
+        fn swapping_left_and_right_negates_the_evidence(offsets in prop::collection::vec(-0.1..0.1_f64, 42)) {
             let joints: Vec<_> = standing()
                 .iter()
                 .zip(offsets.chunks(3))

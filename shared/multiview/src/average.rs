@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_of_an_exchanged_view_are_renamed() {
+    fn the_parts_of_a_swapped_view_are_renamed() {
         let centres = [[0.0; 2], [1.0; 2], [2.0; 2]];
         let got = anatomical(&centres, Some(&[0, 2, 1]));
         assert_eq!(got, [[0.0; 2], [2.0; 2], [1.0; 2]]);

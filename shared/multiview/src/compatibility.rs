@@ -340,7 +340,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_joint_is_recovered_from_its_conditionals(planted in joint()) {
+        fn a_joint_distribution_is_recovered_from_its_conditionals(planted in joint()) {
             let conditionals = [planted.conditional(), planted.transposed().conditional()];
             let (found, disagreement) =
                 Compatibility::joint_from_conditionals(&conditionals[0], &conditionals[1]).unwrap();
@@ -350,7 +350,7 @@ mod tests {
         }
 
         #[test]
-        fn exchanging_the_views_transposes_the_joint(one in joint(), other in joint()) {
+        fn swapping_the_views_transposes_the_joint_distribution(one in joint(), other in joint()) {
             // Two tables that contradict each other.
             let (second, first) = (one.conditional(), other.transposed().conditional());
             let (joint, there) = Compatibility::joint_from_conditionals(&second, &first).unwrap();

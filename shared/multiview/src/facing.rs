@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_view_is_not_exchanged() {
+    fn a_missing_view_is_not_swapped() {
         let got = rank_facing(0b110, &[pair(1, 2, 0.0, 1.0)], 8);
         assert_eq!(got, [(0b100, 1.0), (0b000, 0.0)]);
     }
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn an_assignment_alone_has_no_rival() {
+    fn a_single_assignment_has_an_infinite_margin() {
         let mut filter = FacingFilter::default();
         let got = filter.decide(&FacingSettings::default(), &[hypothesis(0b010, 1.0)], 0b011);
         assert_eq!((got.exchanges, got.margin), (0b010, f64::INFINITY));

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn who_looks_into_the_camera_faces_it() {
+    fn a_person_who_looks_into_the_camera_faces_the_camera() {
         let place = Point3::new(0.0, 0.0, 3.0);
         let [right, towards] = front_in_view(&camera(), &place, &-Vector3::z());
         assert!(right.abs() < 1e-12 && (towards - 1.0).abs() < 1e-12);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn the_right_is_that_of_the_picture_wherever_the_person_stands() {
+    fn right_means_right_in_the_picture_for_any_position_of_the_person() {
         let place = Point3::new(1.0, 0.5, 2.0);
         let camera = camera();
         let right = camera.project(&(place + Vector3::x() * 0.1)).unwrap();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn exchanging_left_and_right_turns_the_front_around() {
+    fn swapping_left_and_right_reverses_the_facing() {
         let mut joints = vec![None; 14];
         joints[R_HIP] = Some(Point3::new(0.0, -0.1, 0.9));
         joints[L_HIP] = Some(Point3::new(0.0, 0.1, 0.9));

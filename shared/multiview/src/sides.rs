@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_alone_is_decided_by_its_evidence() {
+    fn a_single_frame_is_decided_by_its_evidence() {
         let got = decide(&mut SidesFilter::default(), Vector3::x(), -4.0);
         assert!(got.exchange && !got.unsure);
         assert_eq!(got.margin, 4.0);
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn earlier_frames_outvote_one_that_says_little() {
+    fn earlier_frames_outvote_one_with_weak_evidence() {
         let mut filter = SidesFilter::default();
         for _ in 0..5 {
             decide(&mut filter, Vector3::x(), 2.0);
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_that_are_exchanged_from_frame_to_frame_are_followed() {
+    fn labels_that_swap_between_frames_are_corrected() {
         let mut filter = SidesFilter::default();
         for frame in 0..10 {
             let sign = if frame % 2 == 0 { 1.0 } else { -1.0 };
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_beginning_is_put_right_by_strong_evidence() {
+    fn a_wrong_first_decision_is_corrected_by_strong_evidence() {
         let mut filter = SidesFilter::default();
         for _ in 0..100 {
             decide(&mut filter, Vector3::x(), -1.0);
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_by_a_right_angle_is_decided_anew() {
+    fn after_a_turn_by_a_right_angle_the_sides_are_decided_again() {
         let mut filter = SidesFilter::default();
         decide(&mut filter, Vector3::x(), 5.0);
         let got = decide(&mut filter, Vector3::y(), -0.5);
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_change_nothing() {
+    fn invalid_numbers_have_no_effect() {
         let got = decide(&mut SidesFilter::default(), Vector3::x(), f64::NAN);
         assert_eq!((got.exchange, got.margin, got.unsure), (false, 0.0, true));
     }

@@ -126,13 +126,13 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_without_lens_solution_has_a_large_finite_distance() {
+    fn a_cell_that_cannot_be_undistorted_has_a_large_finite_distance() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, f64::INFINITY).unwrap();
         assert_eq!(term.distance2([f64::NAN; 2], 4.0), 2.0 * UNSEEN);
     }
 
     #[test]
-    fn a_support_without_lens_solution_has_the_same_distance_everywhere() {
+    fn a_support_that_cannot_be_undistorted_has_the_same_distance_everywhere() {
         let term = Term::new(side_by_side(), [f64::NAN; 2], 4.0, 3.0).unwrap();
         assert!(term.is_constant());
         assert_eq!(term.distance2([7.0, 38.0], 4.0), 2.0 * 9.0);

@@ -163,7 +163,7 @@ impl Problem for Cloud {
 }
 
 #[test]
-fn derivatives_are_those_of_differences() {
+fn derivatives_equal_finite_differences() {
     for lens in [LensModel::Pinhole, BROWN, FISHEYE] {
         let cloud = Cloud::new(3, 4, lens, ALL).disturbed();
         let error = derivative_error(&cloud, 1e-6);
@@ -172,7 +172,7 @@ fn derivatives_are_those_of_differences() {
 }
 
 #[test]
-fn cameras_and_points_are_found_again() {
+fn cameras_and_points_are_recovered() {
     for lens in [LensModel::Pinhole, FISHEYE] {
         let truth = Cloud::new(4, 60, lens, Free::POSE);
         let (found, report) = solve(truth.disturbed(), &Settings::default());
@@ -186,7 +186,7 @@ fn cameras_and_points_are_found_again() {
 }
 
 #[test]
-fn focal_lengths_and_lenses_are_found_with_the_poses() {
+fn focal_lengths_and_lenses_are_estimated_together_with_the_poses() {
     let free = Free {
         lens: [true, true, false, false, false, false, true, true],
         ..ALL
@@ -200,7 +200,7 @@ fn focal_lengths_and_lenses_are_found_with_the_poses() {
 }
 
 #[test]
-fn what_is_far_off_hardly_moves_a_robust_answer() {
+fn outliers_hardly_change_a_robust_solution() {
     let mut cloud = Cloud::new(4, 60, LensModel::Pinhole, Free::POSE);
     let truth = cloud.clone();
     for nth in 0..6 {
@@ -221,7 +221,7 @@ fn what_is_far_off_hardly_moves_a_robust_answer() {
 }
 
 #[test]
-fn the_covariance_is_how_answers_spread() {
+fn the_covariance_matches_the_spread_of_solutions() {
     let truth = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
     let covariance = covariance(&truth).unwrap();
     let place = truth.cameras.pose_parameters(2).unwrap()[4];
@@ -244,7 +244,7 @@ fn the_covariance_is_how_answers_spread() {
 }
 
 #[test]
-fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
+fn clustered_covariances_match_the_spread_if_errors_are_correlated() {
     const N_CLUSTERS: usize = 10;
     let mut truth = Cloud::new(3, 60, LensModel::Pinhole, Free::POSE);
     truth.loss = Loss::Square;
@@ -279,7 +279,7 @@ fn clusters_tell_how_answers_spread_where_errors_have_much_in_common() {
 }
 
 #[test]
-fn what_is_not_determined_is_named() {
+fn undetermined_parameters_are_named() {
     let mut cloud = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
     cloud.baseline = None;
     let error = covariance(&cloud).unwrap_err().to_string();
@@ -299,7 +299,7 @@ fn what_is_not_determined_is_named() {
 }
 
 #[test]
-fn a_point_that_one_camera_alone_sees_tells_nothing_and_harms_nothing() {
+fn a_point_seen_by_one_camera_has_no_effect() {
     let truth = Cloud::new(3, 40, LensModel::Pinhole, Free::POSE);
     let mut lonely = truth.clone();
     lonely.seen[3] = vec![None, lonely.seen[3][1], None];
@@ -310,7 +310,7 @@ fn a_point_that_one_camera_alone_sees_tells_nothing_and_harms_nothing() {
 }
 
 #[test]
-fn losses_have_the_derivatives_that_they_say() {
+fn losses_have_the_stated_derivatives() {
     for loss in [Loss::Square, Loss::Huber(1.5), Loss::Cauchy(2.0)] {
         for s in [0.1, 1.0, 5.0, 100.0] {
             let numeric = (loss.of(s + 1e-5).0 - loss.of(s - 1e-5).0) / 2e-5;

@@ -11,7 +11,7 @@ use super::*;
 
 proptest! {
     #[test]
-    fn images_of_one_point_lie_on_each_others_lines(a in camera(), b in camera(), point in point()) {
+    fn images_of_one_point_lie_on_the_epipolar_lines_of_each_other(a in camera(), b in camera(), point in point()) {
         prop_assume!((a.centre_in_world() - b.centre_in_world()).norm() > 0.1);
         if let (Some(in_a), Some(in_b)) = (a.project(&point), b.project(&point)) {
             let (in_a, in_b) = (a.undistorted_px(&in_a).expect("inside"), b.undistorted_px(&in_b).expect("inside"));
@@ -59,7 +59,7 @@ fn the_curve_stays_in_the_image_and_reaches_its_border() {
 }
 
 #[test]
-fn cameras_in_one_place_have_no_epipolar_geometry() {
+fn cameras_at_the_same_position_have_no_epipolar_geometry() {
     let camera = &ring(1, LensModel::Pinhole)[0];
     let f = fundamental(camera, camera);
     assert_eq!(f, Matrix3::zeros());

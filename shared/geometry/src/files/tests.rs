@@ -120,7 +120,7 @@ fn with_simpler_lens(mut camera: Camera, n: usize) -> Camera {
 
 proptest! {
     #[test]
-    fn own_format_reads_back_what_was_written(rig in rig()) {
+    fn the_parallax_format_reads_back_what_was_written(rig in rig()) {
         let read = own::parse(&own::write(&rig), &ReadOptions::default()).expect("our own");
         assert_same_cameras(&read, &rig);
         prop_assert_eq!(read.up_in_world(), rig.up_in_world());
@@ -210,7 +210,7 @@ fn every_format_is_detected_and_read_from_disk() {
 }
 
 #[test]
-fn the_pair_of_easymocap_is_one_rig() {
+fn the_two_files_of_easymocap_give_one_rig() {
     let folder = tempfile::tempdir().expect("a folder");
     let rig = ring_rig(2, BARREL);
     let text = opencv::write(&rig).expect("writable");

@@ -39,7 +39,7 @@ proptest! {
     }
 
     #[test]
-    fn an_upright_frame_shows_the_up_direction_vertical(model in lens_model(), extra in -1.4..1.4) {
+    fn an_upright_frame_shows_the_up_direction_as_vertical(model in lens_model(), extra in -1.4..1.4) {
         let mut cameras = ring(3, model);
         for camera in &mut cameras {
             camera.intrinsics.fy *= 1.07;
@@ -87,7 +87,7 @@ fn scaling_by_a_quarter_keeps_pixel_edges_aligned() {
 }
 
 #[test]
-fn no_change_is_the_identity_to_the_last_bit() {
+fn an_unchanged_framing_is_exactly_the_identity() {
     let mut camera = ring(1, LensModel::Pinhole).remove(0);
     camera.intrinsics.cx = 318.973_693_843_75;
     let framing =
@@ -100,7 +100,7 @@ fn no_change_is_the_identity_to_the_last_bit() {
 }
 
 #[test]
-fn another_aspect_pads_evenly() {
+fn another_aspect_ratio_is_padded_evenly() {
     let camera = ring(1, LensModel::Pinhole).remove(0);
     let framing = Framing::new(&camera, [640, 480], None, OutSize::Exact([320, 320]), 0.0)
         .expect("sizes fit");
@@ -154,7 +154,7 @@ fn invalid_output_sizes_and_rolls_are_refused() {
 }
 
 #[test]
-fn there_is_no_upright_roll_where_up_is_unknown_or_along_the_axis() {
+fn there_is_no_upright_roll_if_up_is_unknown_or_along_the_axis() {
     let cameras = ring(2, LensModel::Pinhole);
     let unknown = Rig::new(cameras.clone(), None, "").expect("a rig");
     assert_eq!(upright_roll(&cameras[0], &unknown), None);
@@ -163,7 +163,7 @@ fn there_is_no_upright_roll_where_up_is_unknown_or_along_the_axis() {
 }
 
 #[test]
-fn a_single_camera_is_turned_upright_too() {
+fn a_single_camera_is_rotated_upright_too() {
     let rig = ring_rig(1, LensModel::Pinhole);
     let mut camera = rig.cameras()[0].clone();
     camera.camera_from_world =

@@ -51,7 +51,7 @@ proptest! {
     }
 
     #[test]
-    fn turning_a_lens_turns_its_picture(model in lens_model(), angle in -3.0..3.0, x in -0.4..0.4, y in -0.4..0.4) {
+    fn rotating_a_lens_rotates_its_picture(model in lens_model(), angle in -3.0..3.0, x in -0.4..0.4, y in -0.4..0.4) {
         let turn = nalgebra::Rotation2::new(angle);
         let point = Point2::new(x, y);
         let (plain, turned) = (Lens::new(model), Lens::new(model.rotated(angle)));

@@ -91,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn only_the_camera_that_is_two_degrees_off_is_suspected(
+    fn only_the_camera_that_is_rotated_by_two_degrees_is_suspected(
         n in 4_usize..8, noise_px in 0.0..6.0, seed: u64, moved in any::<prop::sample::Index>(), bearing in 0.0..6.2,
     ) {
         let cameras = around(n);
@@ -128,7 +128,7 @@ fn an_offset_of_half_a_grid_cell_is_no_moved_camera() {
 }
 
 #[test]
-fn neither_of_two_cameras_is_suspected() {
+fn with_two_cameras_none_is_suspected() {
     let cameras = around(2);
     let believed = vec![cameras[0].clone(), turned(&cameras[1], Vector3::x(), 5.0)];
     let watch = watch(&cameras, believed, 0.0, 1, 30);

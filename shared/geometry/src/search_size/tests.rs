@@ -56,7 +56,7 @@ fn shipped(name: &str) -> SearchSizes {
 }
 
 #[test]
-fn a_person_amid_a_ring_has_a_good_height_whatever_the_cameras() {
+fn a_person_in_the_middle_of_a_ring_has_a_good_height_for_any_cameras() {
     // Image size, focal length, and distance from the origin.
     for (size, focal, radius) in [
         ([1920, 1080], 1400.0, 3.0),
@@ -81,7 +81,7 @@ fn a_person_amid_a_ring_has_a_good_height_whatever_the_cameras() {
 }
 
 #[test]
-fn a_ring_has_one_scale_with_an_up_direction_or_without() {
+fn a_ring_of_cameras_has_one_scale_with_or_without_an_up_direction() {
     for n in 3..=8 {
         let cameras = ring(n, [1080, 1920], 1500.0, 3.5, 1.0);
         let unknown = Rig::new(cameras.clone(), None, "planted").unwrap();
@@ -95,7 +95,7 @@ fn a_ring_has_one_scale_with_an_up_direction_or_without() {
 }
 
 #[test]
-fn cameras_that_are_held_on_their_sides_give_the_same() {
+fn cameras_rotated_by_90_degrees_give_the_same_scale() {
     let upright = ring(4, [1920, 1080], 1400.0, 4.0, 1.0);
     let rolled = upright.iter().map(|upright| Camera {
         camera_from_world: Isometry3::rotation(Vector3::z() * core::f64::consts::FRAC_PI_2)
@@ -110,7 +110,7 @@ fn cameras_that_are_held_on_their_sides_give_the_same() {
 }
 
 #[test]
-fn the_shipped_rigs_have_sizes_that_people_who_know_them_chose() {
+fn the_included_rigs_get_the_sizes_chosen_by_hand() {
     for name in ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"] {
         let got = shipped(name);
         assert_eq!(got.n_sharing, 4, "{name}");
@@ -127,7 +127,7 @@ fn the_shipped_rigs_have_sizes_that_people_who_know_them_chose() {
 }
 
 #[test]
-fn a_stereo_pair_has_a_person_of_about_half_its_picture() {
+fn a_person_fills_about_half_of_the_picture_of_a_stereo_pair() {
     for (size, focal) in [
         ([640, 480], 550.0),
         ([1920, 1080], 1100.0),
@@ -155,7 +155,7 @@ fn a_stereo_pair_has_a_person_of_about_half_its_picture() {
 }
 
 #[test]
-fn cameras_of_different_sizes_have_scales_of_their_own() {
+fn cameras_of_different_sizes_have_different_scales() {
     let mut cameras = ring(4, [1920, 1080], 1400.0, 3.5, 1.0);
     cameras[1] = camera("small", [640, 480], 500.0, cameras[1].camera_from_world);
     let rig = rig(cameras);
@@ -170,7 +170,7 @@ fn cameras_of_different_sizes_have_scales_of_their_own() {
 }
 
 #[test]
-fn cameras_that_share_nothing_get_the_largest_frame_that_is_not_too_large() {
+fn cameras_without_a_shared_space_get_the_largest_allowed_frame() {
     let outwards = [0.0, core::f64::consts::PI].map(|turn| {
         let at = looking_at_origin(0.0, 3.0, 0.0, 0.0);
         camera(
@@ -193,7 +193,7 @@ fn cameras_that_share_nothing_get_the_largest_frame_that_is_not_too_large() {
 }
 
 #[test]
-fn one_camera_that_looks_elsewhere_does_not_change_the_others() {
+fn one_camera_that_looks_elsewhere_does_not_change_the_scale_of_the_others() {
     let mut cameras = ring(4, [1920, 1080], 1400.0, 3.5, 1.0);
     let alone = search_sizes(&rig(cameras.clone())).cameras[0].clone();
     let away = Isometry3::rotation(Vector3::y() * 2.8) * cameras[3].camera_from_world;
@@ -204,7 +204,7 @@ fn one_camera_that_looks_elsewhere_does_not_change_the_others() {
 }
 
 #[test]
-fn people_far_from_large_cameras_are_smaller_than_is_good_and_that_is_known() {
+fn people_far_from_large_cameras_are_reported_as_too_small() {
     let got = search_sizes(&rig(ring(4, [1920, 1080], 1400.0, 9.0, 2.0)));
     for it in got.cameras {
         assert!(it.is_limited(), "{it:?}");
@@ -219,7 +219,7 @@ fn people_far_from_large_cameras_are_smaller_than_is_good_and_that_is_known() {
 }
 
 #[test]
-fn a_camera_above_sees_parts_as_large_as_one_beside() {
+fn a_camera_above_people_gets_the_same_size_of_parts_as_one_beside_them() {
     let mut cameras = ring(4, [1920, 1080], 1400.0, 3.5, 1.0);
     let down = Isometry3::rotation(Vector3::x() * core::f64::consts::PI)
         * Isometry3::translation(0.0, 0.0, -3.6);
@@ -230,7 +230,7 @@ fn a_camera_above_sees_parts_as_large_as_one_beside() {
 }
 
 #[test]
-fn a_better_scale_is_round_and_brings_people_to_size() {
+fn a_suggested_scale_is_round_and_gives_people_a_good_size() {
     assert_eq!(better_scale(&[[1.0, 690.0], [1.0, 710.0]]), Some(0.29));
     assert_eq!(better_scale(&[[0.25, 80.0]]), Some(0.63));
     assert_eq!(better_scale(&[[1.0, 20.0]]), Some(2.0));

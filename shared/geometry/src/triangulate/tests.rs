@@ -113,7 +113,7 @@ proptest! {
 }
 
 #[test]
-fn the_covariance_is_that_of_the_triangulated_points() {
+fn the_covariance_matches_the_spread_of_triangulated_points() {
     let cameras = ring(3, BARREL);
     let point = Point3::new(0.2, -0.1, 0.3);
     let settings = Settings {
@@ -216,7 +216,7 @@ fn the_same_input_gives_the_same_bits() {
 }
 
 #[test]
-fn refuses_one_view_and_more_than_the_limit() {
+fn refuses_one_view_and_more_views_than_the_limit() {
     let cameras = ring(33, LensModel::Pinhole);
     let seen = observe(&cameras, &Point3::origin(), &[]);
     let solve = |n: usize| triangulate(&seen[..n], &Settings::default());

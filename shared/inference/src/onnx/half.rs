@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_half_number_keeps_its_bits() {
+    fn every_half_precision_number_keeps_its_bits() {
         for bits in 0..=u16::MAX {
             let value = value_of(bits);
             if !value.is_nan() {
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_between_two_becomes_the_nearer_and_the_even_one_in_the_middle() {
+    fn numbers_are_rounded_to_the_nearest_and_ties_to_even() {
         for bits in (0..0x7bff_u16).step_by(7) {
             let [low, high] = [value_of(bits), value_of(bits + 1)];
             let middle = f32::midpoint(low, high);

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_texts_are_written_as_the_documentation_of_the_format_shows() {
+    fn numbers_and_texts_are_encoded_as_the_format_documents() {
         assert_eq!(
             Message::default().number(1, 150).finish(),
             [0x08, 0x96, 0x01]

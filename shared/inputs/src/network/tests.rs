@@ -32,7 +32,7 @@ fn network() -> Network {
 }
 
 #[test]
-fn a_card_is_found_beside_the_network_or_in_it_or_where_it_is_said() {
+fn a_card_is_found_beside_the_network_or_in_it_or_at_the_given_path() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("net.onnx");
     let mut net = network();
@@ -58,7 +58,7 @@ fn a_card_is_found_beside_the_network_or_in_it_or_where_it_is_said() {
 }
 
 #[test]
-fn a_network_without_a_card_or_cut_short_is_refused() {
+fn a_truncated_network_and_one_without_a_card_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("net.onnx");
     let bytes = network().file();
@@ -88,7 +88,7 @@ fn a_network_without_a_card_or_cut_short_is_refused() {
 }
 
 #[test]
-fn the_nearest_card_has_the_networks_sides() {
+fn the_nearest_card_has_the_input_size_of_the_network() {
     let near = |inputs: &[usize], outputs: &[(&str, &[usize])]| {
         let mut net = Network::default();
         let sides = |sizes: &[usize]| sizes.iter().map(|n| Side::Fixed(*n)).collect::<Vec<_>>();

@@ -124,7 +124,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(sized(96, 2) as u32))]
 
     #[test]
-    fn convolves_to_the_bits_of_the_plain_loops(case in cases()) {
+    fn convolution_equals_the_plain_loops_bit_for_bit(case in cases()) {
         let want = case.given(|conv, input, residual, outputs| {
             conv.run_plain(input, residual, outputs);
         });
@@ -137,7 +137,7 @@ proptest! {
     }
 
     #[test]
-    fn the_plain_loops_give_the_definition(case in cases()) {
+    fn the_plain_loops_equal_the_definition(case in cases()) {
         let (size, [rows, cols]) = (case.size, case.out());
         let (conv, input) = (case.conv(), case.input());
         let mut raw = Blocked::new(BlockedShape::new([size.outputs, rows, cols], 0));
@@ -159,7 +159,7 @@ proptest! {
     }
 
     #[test]
-    fn adds_each_pixel_of_a_coarser_stack_to_all_that_it_covers(
+    fn each_pixel_of_a_coarser_stack_is_added_to_all_pixels_that_it_covers(
         channels in 1..40_usize, rows in 1..6_usize, cols in 1..6_usize, repeat in 1..4_usize,
     ) {
         let fine = BlockedShape::new([channels, rows * repeat, cols * repeat], 1);
@@ -178,7 +178,7 @@ proptest! {
     }
 
     #[test]
-    fn planes_go_in_and_come_out(channels in 1..40_usize, rows in 1..5_usize, cols in 1..5_usize) {
+    fn planes_survive_a_round_trip_through_blocks(channels in 1..40_usize, rows in 1..5_usize, cols in 1..5_usize) {
         let planes = noise(channels * rows * cols, 7);
         for shape in [BlockedShape::new, BlockedShape::packed].map(|new| new([channels, rows, cols], 1)) {
             let mut stack = Blocked::new(shape);
@@ -191,7 +191,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_no_number_stays_none() {
+fn nan_stays_nan() {
     let size = ConvSize {
         inputs: 1,
         outputs: 1,
@@ -214,7 +214,7 @@ fn what_is_no_number_stays_none() {
 }
 
 #[test]
-fn only_kernels_of_three_by_three_at_a_stride_of_one_come_in_tiles() {
+fn only_three_by_three_kernels_with_stride_one_are_computed_in_tiles() {
     for (kernel, stride) in [([3, 3], [2, 2]), ([3, 1], [1, 1]), ([1, 1], [1, 1])] {
         let size = ConvSize {
             inputs: 1,

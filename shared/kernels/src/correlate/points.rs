@@ -159,7 +159,7 @@ mod tests {
 
     /// Tests that interpolation is exact: placement `i` combines filter cell `c` with map cell `i + c` only.
     #[test]
-    fn the_matrices_correlate() {
+    fn the_transform_matrices_compute_a_correlation() {
         for n_pairs in [3, 4] {
             let points = Points::new(n_pairs);
             for taps in 3..=sized(6, 4) {

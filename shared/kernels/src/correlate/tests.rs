@@ -165,7 +165,7 @@ proptest! {
 
     /// Uses up to 70 columns and 40 filters of mixed sizes, so that incomplete blocks of every size occur.
     #[test]
-    fn every_instruction_set_gives_the_bits_of_the_readable_version(
+    fn every_instruction_set_equals_the_readable_version_bit_for_bit(
         sizes in prop::collection::vec([1..sized(12, 9), 1..sized(70, 20)], 1..sized(4, 2)),
         filters in prop::collection::vec(filters(), 1..sized(3, 2)),
         seed in any::<u64>(),
@@ -272,7 +272,7 @@ fn the_method_depends_on_sizes_only() {
 }
 
 #[test]
-fn blocks_cover_everything_once_and_evenly() {
+fn blocks_cover_every_index_once_and_respect_the_maximum_size() {
     for total in 0..70 {
         let all: Vec<_> = blocks(total, 14).collect();
         assert!(all.iter().all(|block| (1..=14).contains(&block.len())));

@@ -158,7 +158,7 @@ proptest! {
     }
 
     #[test]
-    fn own_scores_are_sums_cell_by_cell(
+    fn own_scores_are_added_cell_by_cell(
         (grid, map, term) in (1..12_usize, 1..40_usize).prop_flat_map(|(rows, cols)| {
             let cells = rows * cols;
             (Just(Grid { rows, cols }), vec(scores(), cells), vec(scores(), cells))

@@ -22,7 +22,7 @@ pub(crate) fn card() -> Card {
 }
 
 #[test]
-fn what_is_left_out_is_the_usual() {
+fn omitted_card_entries_get_the_defaults() {
     let card = card();
     assert_eq!(card.input.layout, Layout::Planes);
     assert_eq!((card.input.scale, card.input.std), (1.0, [1.0; 3]));
@@ -134,7 +134,7 @@ const CASES: [[&str; 3]; 18] = [
 ];
 
 #[test]
-fn wrong_values_are_named_with_what_is_accepted() {
+fn wrong_values_are_named_with_the_accepted_ones() {
     for [from, to, expected] in CASES {
         assert!(TEXT.contains(from), "{from}");
         let said = Card::parse(&TEXT.replace(from, to))
@@ -145,7 +145,7 @@ fn wrong_values_are_named_with_what_is_accepted() {
 
 proptest! {
     #[test]
-    fn any_text_is_read_or_refused(text in ".{0,200}", at in 0..200_usize) {
+    fn any_text_is_parsed_as_a_card_or_refused(text in ".{0,200}", at in 0..200_usize) {
         let _either = Card::parse(&text);
         let mut changed = TEXT.to_owned();
         let at = changed.floor_char_boundary(at.min(changed.len()));

@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_lies_around_the_middle_of_its_cell_and_its_neighbours_say_nothing() {
+    fn a_maximum_gives_one_box_around_its_cell() {
         let around = [1.0, 2.0, 1.5, 4.0];
         let cells = [
             ([3, 2], 2.0, around),
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn two_people_who_stand_in_front_of_each_other_are_two() {
+    fn two_people_in_front_of_each_other_give_two_boxes() {
         let around = [3.0; 4];
         let found = boxes(
             &values(&[([4, 3], 1.0, around), ([6, 3], 2.0, around)]),
@@ -102,7 +102,7 @@ mod tests {
     proptest! {
         /// Checks that no two boxes come from cells that touch, that all scores are high enough, and that every side is finite.
         #[test]
-        fn boxes_are_finite_and_of_cells_apart(
+        fn boxes_are_finite_and_from_separate_cells(
             heat in prop::collection::vec(-3.0_f32..3.0, 96),
             sides in prop::collection::vec(-100.0_f32..100.0, 4 * 96),
         ) {

@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_and_a_video_of_mmpose_are_read() {
+    fn mmpose_files_of_pictures_and_videos_are_read() {
         let picture = format!("[{},{}]", person(17, "0.5"), person(17, "NaN"));
         let frame = openpose::parse(picture.as_bytes(), None).unwrap();
         let first = frame.people[0].keypoints[0].unwrap();
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn names_in_the_file_are_taken() {
+    fn names_in_the_file_are_used() {
         let named = "\"0\":\"left_hip\",\"1\":\"right_hip\",\"10\":\"nose\",\"2\":\"neck\"";
         let text = format!(
             "{{\"meta_info\":{{\"keypoint_id2name\":{{{named}}}}},\"instance_info\":[{{\"frame_id\":0,\"instances\":[{}]}}]}}",
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_in_space_are_no_keypoints() {
+    fn keypoint_files_with_3d_joints_are_refused() {
         let text = format!("[{}]", person(17, "1").replace("20.0", "20.0, 1.0"));
         let refused = openpose::parse(text.as_bytes(), None).unwrap_err();
         assert!(refused.to_string().contains("has 3 numbers"), "{refused}");

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_name_the_sets_that_programs_write() {
+    fn the_number_of_keypoints_identifies_the_set_of_a_program() {
         for (n, set) in [
             (17, "coco-17"),
             (18, "openpose-18"),
@@ -159,13 +159,13 @@ mod tests {
     }
 
     #[test]
-    fn names_are_taken_in_the_spelling_of_coco() {
+    fn names_in_the_spelling_of_coco_are_accepted() {
         let set = NameSet::new(["nose", "left_hip", "Right Hip"]).unwrap();
         assert_eq!(set.names(), ["nose", "left hip", "right hip"]);
     }
 
     #[test]
-    fn names_that_cannot_be_are_refused() {
+    fn impossible_names_are_refused() {
         let refused = |names: &[&str]| NameSet::new(names).unwrap_err().to_string();
         assert!(refused(&[]).contains("0 names"));
         assert!(refused(&["neck"; 300]).contains("257 names"));

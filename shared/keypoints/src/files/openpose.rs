@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_of_keypoints_names_them_and_zeros_are_not_found() {
+    fn the_number_of_keypoints_determines_their_names_and_zeros_mean_not_found() {
         let mut values = vec![0.0; 75];
         values[3..6].copy_from_slice(&[505.25, 431.5, 0.66]);
         values[6..9].copy_from_slice(&[-2.0, 3.0, 1.04]);
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_the_caller_go_before_the_number() {
+    fn given_names_take_precedence_over_the_number_of_keypoints() {
         let names = NameSet::new((0..24).map(|i| format!("k{i}")).chain(["neck".to_owned()]));
         let names = names.unwrap();
         let frame = parse(file(&[&[1.0; 75]]).as_bytes(), Some(&names)).unwrap();
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_refused_with_its_place() {
+    fn impossible_openpose_values_are_refused_with_their_place() {
         let unknown = refused(&file(&[&[0.0; 9]]));
         assert!(
             unknown.contains("people[0]") && unknown.contains("3 keypoints"),
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_json_of_the_layout_is_refused_with_line_and_column() {
+    fn invalid_json_is_refused_with_line_and_column() {
         for text in [
             "",
             "[1]",
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn keypoints_under_keys_that_are_not_read_are_refused_with_the_keys() {
+    fn files_with_keypoints_only_under_unsupported_keys_are_refused_with_the_keys() {
         let text = file(&[&[1.0; 54]]).replace("pose_keypoints_2d", "pose_keypoints_3d");
         let other = refused(&text);
         assert!(
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_was_not_found() {
+    fn a_keypoint_with_invalid_numbers_counts_as_not_found() {
         let text = file(&[&[1.0; 51]]);
         for nothing in ["NaN", "null", "Infinity", "-Infinity", "nan"] {
             let text = text.replacen("1.0", nothing, 1);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn of_133_keypoints_those_of_the_body_and_the_feet_are_read() {
+    fn from_133_keypoints_the_body_and_the_feet_are_read() {
         for (n, read, last) in [(133, 23, "right heel"), (136, 26, "right heel")] {
             let frame = parse(file(&[&vec![1.0; 3 * n]]).as_bytes(), None).unwrap();
             let names = frame.names.unwrap();
@@ -242,7 +242,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_is_written_is_read_again(values in prop::collection::vec(-1e6..1e6, 51..52), n in 1_usize..4) {
+        fn written_keypoints_are_read_back(values in prop::collection::vec(-1e6..1e6, 51..52), n in 1_usize..4) {
             let lists = vec![&values[..]; n];
             let frame = parse(file(&lists).as_bytes(), None).unwrap();
             prop_assert_eq!(frame.people.len(), n);

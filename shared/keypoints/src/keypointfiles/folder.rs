@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_digits_of_a_name_are_the_number_of_its_frame() {
+    fn the_last_digits_of_a_file_name_are_the_frame_number() {
         for (name, expected) in [
             ("cam01_000000000012_keypoints.json", Some(12)),
             ("cam02.0024.json", Some(24)),

@@ -28,7 +28,7 @@ fn a_stretched_box_fills_the_input() {
 
 proptest! {
     #[test]
-    fn a_point_has_the_same_colour_either_way(
+    fn both_samplers_give_the_same_colour_at_every_point(
         x in -2.0..9.0_f64,
         y in -2.0..7.0_f64,
         whole in any::<bool>(),
@@ -79,7 +79,7 @@ fn the_input_is_the_picture_prepared_as_the_card_says() {
 
 proptest! {
     #[test]
-    fn there_and_back_is_the_same_place(
+    fn mapping_a_point_forth_and_back_gives_the_same_point(
         corner in [-500.0..2000.0, -500.0..2000.0_f64], size in [1.0..900.0, 1.0..900.0_f64],
         at in [-100.0..500.0, -100.0..500.0_f64],
     ) {
@@ -101,7 +101,7 @@ fn a_grid_holds_the_box_in_square_cells() {
 }
 
 #[test]
-fn a_grid_over_a_line_or_a_point_is_widened_and_stays_small() {
+fn a_grid_over_a_line_or_a_point_is_widened_but_stays_small() {
     for outline in [
         [10.0, 5.0, 900.0, 5.0],
         [10.0, 5.0, 10.0, 900.0],
@@ -122,7 +122,7 @@ fn a_grid_over_a_line_or_a_point_is_widened_and_stays_small() {
 }
 
 #[test]
-fn the_box_of_keypoints_is_of_those_that_were_found() {
+fn the_box_encloses_the_keypoints_that_were_found() {
     let at = |x, y, score| Some(Keypoint { at: [x, y], score });
     let all = [
         at(5.0, 9.0, 0.1),
@@ -159,7 +159,7 @@ fn decoded(cell: f64, cells: f64, [centre, size, side]: [f64; 3]) -> f64 {
 
 proptest! {
     #[test]
-    fn unbiased_coordinates_are_those_of_the_definition_there_and_back(
+    fn unbiased_coordinates_follow_the_definition_in_both_directions(
         corner in [-500.0..2000.0, -500.0..2000.0_f64], size in [1.0..900.0, 1.0..900.0_f64],
         at in [-100.0..3000.0, -100.0..3000.0_f64], cell in [0_usize..24, 0_usize..32],
     ) {
@@ -200,7 +200,7 @@ fn unbiased_corner_pixels_lie_on_the_edges_of_the_box() {
 }
 
 #[test]
-fn an_unbiased_box_of_as_many_steps_gives_the_picture_itself() {
+fn an_unbiased_box_of_the_input_size_gives_the_picture_itself() {
     let mut card = udp_card(true);
     (card.crop.margin, card.crop.fit) = (1.0, Fit::Stretch);
     let rgb: Vec<u8> = (0..3 * 96 * 128).map(|i| (i * 7 % 251) as u8).collect();

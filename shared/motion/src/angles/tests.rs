@@ -60,7 +60,7 @@ fn is(pose: &[(Role, Vector3<f64>)], angle: Angle, degrees: f64) {
 }
 
 #[test]
-fn standing_upright_is_zero_and_what_a_straight_limb_does_not_tell_is_nothing() {
+fn angles_of_upright_standing_are_zero_and_rotations_of_straight_limbs_are_missing() {
     let pose = standing();
     let defined = |entry: &(Angle, Result<Value, Unknown>)| entry.1.is_ok();
     let all = angles(&estimates(&pose, 0.002), Some(Vector3::z_axis()));
@@ -79,7 +79,7 @@ fn standing_upright_is_zero_and_what_a_straight_limb_does_not_tell_is_nothing() 
 }
 
 #[test]
-fn a_lifted_thigh_is_flexion_and_a_spread_one_abduction() {
+fn a_lifted_thigh_is_flexion_and_a_spread_thigh_is_abduction() {
     for (side, y) in [(Right, -1.0), (Left, 1.0)] {
         let mut pose = standing();
         set(
@@ -117,7 +117,7 @@ fn a_lower_leg_that_points_outwards_from_a_bent_knee_is_internal_rotation() {
 }
 
 #[test]
-fn arms_are_elevated_in_planes_and_rotate_as_the_recommendation_says() {
+fn arm_elevation_and_rotation_follow_the_isb_recommendation() {
     for (side, y) in [(Right, -1.0), (Left, 1.0)] {
         let mut sideways = standing();
         set(&mut sideways, Role::Elbow(side), [0.0, 0.5 * y, 1.45]);
@@ -183,7 +183,7 @@ fn without_feet_or_a_vertical_their_angles_are_missing() {
 }
 
 #[test]
-fn an_angle_that_nothing_is_known_of_is_none() {
+fn an_angle_without_data_is_missing() {
     let pose = standing();
     let all = angles(&estimates(&pose, 0.8), None);
     let knee = all.iter().find(|entry| entry.0 == Angle::KneeFlexion(Left)).unwrap();
@@ -212,7 +212,7 @@ fn bent() -> Vec<(Role, Vector3<f64>)> {
 }
 
 #[test]
-fn what_the_covariances_make_of_an_angle_is_what_sampling_makes_of_it() {
+fn the_deviation_of_an_angle_from_covariances_equals_that_from_sampling() {
     let mut random = fastrand::Rng::with_seed(4);
     let mut normal = || {
         let uniform: f64 = (0..12).map(|_| random.f64()).sum();
@@ -267,7 +267,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_makes_an_angle_that_is_no_number(places in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 18)) {
+    fn angles_are_never_nan(places in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 18)) {
         let pose: Vec<_> = bent().iter().zip(&places).map(|(joint, place)| {
             // Moves every second joint to the same point.
             (joint.0, if place[0] > 0.0 { Vector3::zeros() } else { Vector3::from(*place) })

@@ -56,7 +56,7 @@ fn error_m(recorded: &Recorded, track: &[crate::Smoothed]) -> f64 {
 }
 
 #[test]
-fn with_nothing_set_noise_falls_at_every_rate_and_size_of_the_errors() {
+fn with_default_settings_noise_decreases_at_every_rate_and_error_size() {
     for rate_hz in [10.0, 30.0, 120.0] {
         for sd_m in [0.002, 0.05] {
             let recorded = recorded(rate_hz, sd_m, sd_m, 12.0);
@@ -83,7 +83,7 @@ fn covariances_that_are_wrong_by_a_factor_are_scaled() {
 }
 
 #[test]
-fn what_the_covariances_say_is_how_far_off_the_smoothed_positions_are() {
+fn smoothed_covariances_match_the_errors_of_the_smoothed_positions() {
     let recorded = recorded(60.0, 0.02, 0.02, 20.0);
     let got = crate::smooth(&recorded, &Settings::default());
     let told = got.joints[0].iter().map(|joint| joint.unwrap().covariance.unwrap().trace());
@@ -93,7 +93,7 @@ fn what_the_covariances_say_is_how_far_off_the_smoothed_positions_are() {
 }
 
 #[test]
-fn what_varies_too_slowly_to_be_seen_stays_in_the_covariances() {
+fn slow_errors_remain_in_the_covariances() {
     let recorded = recorded(60.0, 0.002, 0.02, 5.0);
     let got = crate::smooth(&recorded, &Settings::default());
     let told = got.joints[0][150].unwrap().covariance.unwrap();
@@ -125,7 +125,7 @@ fn outliers_are_rejected_and_short_gaps_filled_and_both_are_marked() {
 }
 
 #[test]
-fn exchanged_wrists_are_taken_for_what_they_are() {
+fn swapped_wrists_are_corrected() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
     for at in 120..126 {
         let [a, b] = [0, 1].map(|i| recorded.joints[i].measured[at]);
@@ -144,7 +144,7 @@ fn exchanged_wrists_are_taken_for_what_they_are() {
 }
 
 #[test]
-fn sides_that_are_not_certain_are_decided_by_what_is_before_and_after() {
+fn uncertain_sides_are_decided_by_the_frames_before_and_after() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
     for at in 60..240 {
         if at % 3 == 0 {
@@ -162,7 +162,7 @@ fn sides_that_are_not_certain_are_decided_by_what_is_before_and_after() {
 }
 
 #[test]
-fn where_no_sides_are_certain_nothing_is_thrown_away() {
+fn without_certain_sides_no_measurement_is_rejected() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 2.0);
     recorded.sides.fill(Sides::Unsure);
     let got = crate::smooth(&recorded, &Settings::default());
@@ -170,7 +170,7 @@ fn where_no_sides_are_certain_nothing_is_thrown_away() {
 }
 
 #[test]
-fn somebody_else_begins_anew() {
+fn another_person_starts_a_new_track() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 4.0);
     for joint in &mut recorded.joints {
         for it in joint.measured[120..].iter_mut().flatten() {
@@ -188,7 +188,7 @@ fn somebody_else_begins_anew() {
 }
 
 #[test]
-fn bones_that_are_asked_for_are_constant() {
+fn bone_lengths_are_constant_on_request() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 5.0);
     // The elbow is below the wrist, with errors of its own.
     let mut elbow = recorded.joints[0].clone();
@@ -216,7 +216,7 @@ fn bones_that_are_asked_for_are_constant() {
 }
 
 #[test]
-fn next_to_nothing_is_smoothed_to_what_it_is() {
+fn very_short_and_empty_tracks_are_smoothed_without_failure() {
     for n in [0, 1, 2, 3] {
         let mut recorded = recorded(60.0, 0.01, 0.01, 1.0);
         recorded.times.truncate(n);
@@ -236,7 +236,7 @@ fn next_to_nothing_is_smoothed_to_what_it_is() {
 }
 
 #[test]
-fn numbers_that_are_none_and_irregular_times_come_through() {
+fn invalid_numbers_and_irregular_times_are_tolerated() {
     let mut recorded = recorded(60.0, 0.01, 0.01, 3.0);
     for (at, it) in recorded.joints[0].measured.iter_mut().enumerate() {
         let it = it.as_mut().unwrap();

@@ -90,14 +90,14 @@ fn a_known_offset_is_learned() {
 }
 
 #[test]
-fn it_is_learned_too_where_every_fifth_person_was_found_wrongly() {
+fn the_offset_is_learned_even_if_every_fifth_person_was_found_wrongly() {
     let [own, thigh] = knee(&learn(&with_wrong_ones(people(1, 300, 0.5))));
     assert!((own - 1.0 - BEYOND).abs() < 0.06, "{own}");
     assert!((thigh + BEYOND).abs() < 0.06, "{thigh}");
 }
 
 #[test]
-fn joints_that_are_their_parts_stay_there() {
+fn joints_that_coincide_with_parts_are_unchanged() {
     for (joint, row) in learn(&people(1, 200, 0.0)).iter().enumerate() {
         if !PARSE14.joints[joint].name.ends_with("knee") {
             assert!((row[own(joint)] - 1.0).abs() < 1e-3, "{joint}: {row:?}");
@@ -137,7 +137,7 @@ fn a_small_data_set_counts_as_much_as_a_large_one() {
 }
 
 #[test]
-fn settings_are_chosen_by_people_who_were_left_out() {
+fn settings_are_chosen_on_held_out_people() {
     let tried = try_all(&[people(1, 60, 0.5)]);
     let (best, errors) = best_local(&tried).unwrap();
     assert!(tried.iter().all(|trial| trial.1[0] >= errors[0]));
@@ -164,13 +164,13 @@ fn file() -> JointFile {
 }
 
 #[test]
-fn a_file_is_read_as_it_was_written() {
+fn a_joint_map_survives_a_round_trip() {
     let file = file();
     assert_eq!(JointFile::parse(&file.write().unwrap()).unwrap(), file);
 }
 
 #[test]
-fn every_joint_set_is_made_of_the_same_joints() {
+fn every_joint_set_derives_from_the_same_joints() {
     let file = file();
     let centres = people(9, 1, 0.0)[0].centres;
     let at = |set: &JointSet| file.map(set).unwrap().from_parts(&centres);
@@ -245,7 +245,7 @@ fn a_wrong_file_is_refused_with_the_field() {
 
 proptest! {
     #[test]
-    fn damaged_files_do_no_harm(at in 0_usize..4000, byte in 32_u8..127) {
+    fn damaged_joint_maps_do_not_panic(at in 0_usize..4000, byte in 32_u8..127) {
         let mut text = file().write().unwrap().into_bytes();
         let at = at % text.len();
         text[at] = byte;

@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_area_is_that_of_the_curve() {
+    fn the_area_is_the_area_under_the_curve() {
         let errors = [Some(0.2), Some(0.5), Some(0.9), Some(3.0), None];
         let mut tally = Tally::default();
         tally.add(&errors, &[4, 6]);

@@ -84,7 +84,7 @@ fn the_order_of_two_views_does_not_matter() {
 }
 
 #[test]
-fn views_from_behind_have_tables_of_their_own() {
+fn views_from_behind_have_separate_tables() {
     let mut learner = learner();
     // The right arm has type 1 and the left arm type 2; sides are named as in each picture.
     let side = |value: usize| if value < 14 { 1 } else { 2 };

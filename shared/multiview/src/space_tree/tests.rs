@@ -130,7 +130,7 @@ fn worst(found: &SpacePose) -> f64 {
 const RING: [f64; 4] = [10.0, 95.0, 190.0, 260.0];
 
 #[test]
-fn a_person_whom_all_views_show_is_found() {
+fn a_person_seen_by_all_views_is_found() {
     for n in 2..=4 {
         let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
         let bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
@@ -140,7 +140,7 @@ fn a_person_whom_all_views_show_is_found() {
 }
 
 #[test]
-fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
+fn a_misplaced_joint_is_outvoted_by_bones_and_the_other_views() {
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::new);
     for (view, joint) in [(0, 6), (1, 6), (2, 0), (3, 10)] {
@@ -153,7 +153,7 @@ fn a_joint_that_views_put_elsewhere_is_outvoted_by_bones_and_the_other_views() {
 }
 
 #[test]
-fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() {
+fn a_joint_seen_by_two_views_is_kept_and_one_seen_by_a_single_view_is_missing() {
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::new);
     for view in [1, 3] {
@@ -180,7 +180,7 @@ fn a_joint_that_only_two_views_show_stays_and_one_that_one_view_shows_is_none() 
 }
 
 #[test]
-fn a_view_that_names_the_sides_the_wrong_way_is_exchanged() {
+fn a_view_with_swapped_sides_is_corrected() {
     for n in 3..=4 {
         let cameras: Vec<Camera> = RING[..n].iter().map(|ring| camera(*ring)).collect();
         let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
@@ -194,7 +194,7 @@ fn a_view_that_names_the_sides_the_wrong_way_is_exchanged() {
 }
 
 #[test]
-fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_them() {
+fn sides_as_seen_in_the_pictures_are_unified_for_any_swapped_views() {
     let settings = SpaceSettings {
         as_seen: true,
         ..SpaceSettings::default()
@@ -228,7 +228,7 @@ fn names_that_follow_the_picture_are_brought_together_whichever_views_exchange_t
 }
 
 #[test]
-fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say() {
+fn ambiguous_shoulders_are_resolved_by_the_facing_in_the_views() {
     let settings = SpaceSettings {
         as_seen: true,
         ..SpaceSettings::default()
@@ -270,7 +270,7 @@ fn shoulders_that_two_directions_explain_are_those_that_face_where_the_views_say
 }
 
 #[test]
-fn a_camera_that_was_turned_is_left_out_where_three_others_agree() {
+fn a_rotated_camera_is_left_out_if_three_others_agree() {
     let cameras = RING.map(camera);
     let bumps = cameras.each_ref().map(Bumps::new);
     for turned in 0..4 {
@@ -283,7 +283,7 @@ fn a_camera_that_was_turned_is_left_out_where_three_others_agree() {
 }
 
 #[test]
-fn bones_follow_the_stature_that_the_joints_say() {
+fn bone_lengths_follow_the_stature_estimated_from_the_joints() {
     let of_anybody = lengths_of(None);
     let small = STANDING.map(|standing| Some(Point3::from(standing) * 0.7));
     let of_child = lengths_of(Some(&small));
@@ -296,7 +296,7 @@ fn bones_follow_the_stature_that_the_joints_say() {
 }
 
 #[test]
-fn whoever_is_the_same_person_in_most_views_is_chosen() {
+fn the_person_who_is_consistent_in_most_views_is_chosen() {
     let cameras = [camera(10.0), camera(95.0), camera(190.0)];
     let seen = |camera: &Camera, by: [f64; 2], height: f64| SeenPerson {
         joints: STANDING
@@ -371,7 +371,7 @@ impl JointEvidence for EitherLeg {
 }
 
 #[test]
-fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
+fn both_legs_are_not_placed_on_the_better_visible_one() {
     let cameras = RING.map(camera);
     let evidence = cameras.each_ref().map(EitherLeg::new);
     let apart = solved(&cameras, &evidence);
@@ -385,7 +385,7 @@ fn both_legs_do_not_lie_on_the_one_that_is_seen_better() {
 }
 
 #[test]
-fn legs_that_are_together_stay_together() {
+fn legs_that_are_close_together_stay_close() {
     // Both maps have a peak at the same place only, so there is no other leg to find.
     let cameras = RING.map(camera);
     let mut bumps = cameras.each_ref().map(Bumps::new);

@@ -84,7 +84,7 @@ proptest! {
     }
 
     #[test]
-    fn the_energy_is_the_sum_over_all_pairs_and_never_falls(
+    fn the_energy_is_the_sum_over_all_pairs_and_never_decreases(
         seed: u64,
         start in prop::sample::select(vec![3_usize, 4]).prop_flat_map(starts),
     ) {
@@ -105,7 +105,7 @@ proptest! {
     }
 
     #[test]
-    fn without_weight_every_view_keeps_its_own_best(seed: u64, start in starts(3)) {
+    fn with_zero_weight_every_view_keeps_its_own_best_pose(seed: u64, start in starts(3)) {
         let scene = Scene::new(seed, 3, &SIZES);
         let found = fuse(&scene, &settings(seed), &Start { weight: 0.0, ..start });
         for (view, pose) in scene.views.iter().zip(&found.poses) {
@@ -119,7 +119,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn at_the_end_no_view_alone_can_raise_the_energy(
+    fn at_the_end_no_single_view_can_raise_the_energy(
         seed: u64,
         start in starts(3),
         sizes in prop::sample::select(TINY.to_vec()),

@@ -85,7 +85,7 @@ proptest! {
 
 proptest! {
     #[test]
-    fn the_energy_is_that_of_the_paper_and_never_falls(seed: u64, start in starts()) {
+    fn the_energy_equals_that_of_the_paper_and_never_decreases(seed: u64, start in starts()) {
         let (scene, settings) = (Scene::new(seed, 2, &SIZES), settings(seed));
         let found = scene.fuse(&settings, [0, 1], start);
         let energy = |poses: &[Pose; 2]| {
@@ -118,7 +118,7 @@ proptest! {
     }
 
     #[test]
-    fn exchanging_the_views_exchanges_their_poses(seed: u64, start in starts()) {
+    fn swapping_the_views_swaps_their_poses(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         // The scene has no tables for the pair (1, 0).
         let settings = Settings { beta: 0.0, ..settings(seed) };
@@ -136,7 +136,7 @@ proptest! {
     }
 
     #[test]
-    fn exchanging_left_and_right_in_both_views_changes_nothing(seed: u64, start in starts()) {
+    fn swapping_left_and_right_in_both_views_changes_nothing(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { beta: 0.0, ..settings(seed) };
         let plain = scene.fuse(&settings, [0, 1], start);
@@ -149,7 +149,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_exchanged(seed: u64, start in starts()) {
+    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_swapped(seed: u64, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { beta: 0.0, ..settings(seed) };
         let plain = scene.fuse(&settings, [0, 1], start);
@@ -165,7 +165,7 @@ proptest! {
     }
 
     #[test]
-    fn parts_that_are_off_have_no_terms(seed: u64, blind in 0..2_usize, start in starts()) {
+    fn parts_that_are_switched_off_have_no_terms(seed: u64, blind in 0..2_usize, start in starts()) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         scene.views[blind].sigma_px = Some(vec![9.0; N_PARTS]);
         let settings = Settings { tau_px: vec![8.0; N_PARTS], ..settings(seed) };
@@ -215,7 +215,7 @@ proptest! {
     }
 
     #[test]
-    fn without_weight_every_view_keeps_its_own_best(seed: u64, start in starts()) {
+    fn with_zero_weight_every_view_keeps_its_own_best_pose(seed: u64, start in starts()) {
         let scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { alpha: 0.0, beta: 0.0, ..settings(seed) };
         let found = scene.fuse(&settings, [0, 1], start);
@@ -245,7 +245,7 @@ proptest! {
     }
 
     #[test]
-    fn cell_centres_are_those_without_lens_distortion(seed: u64) {
+    fn cell_centres_are_undistorted(seed: u64) {
         let scene = Scene::new(seed, 1, &SIZES);
         let plan = &scene.views[0].plan;
         let mut pose = scene.views[0].candidates[0].clone();
@@ -312,7 +312,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn neither_view_alone_can_raise_the_energy(seed: u64, start in starts(), sizes in 0..2_usize) {
+    fn no_single_view_can_raise_the_energy(seed: u64, start in starts(), sizes in 0..2_usize) {
         let (scene, settings) = (Scene::new(seed, 2, TINY[sizes]), settings(seed));
         let found = scene.fuse(&settings, [0, 1], start);
         prop_assert!(found.converged);
@@ -349,7 +349,7 @@ fn the_optimiser_continues_while_only_types_change() {
 }
 
 #[test]
-fn a_support_without_lens_solution_has_no_effect() {
+fn a_support_whose_pixel_cannot_be_undistorted_has_no_effect() {
     for seed in 0..20 {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let layout = Arc::new(layout(&SIZES, 4.0));
@@ -392,7 +392,7 @@ fn an_expected_error_at_the_threshold_is_not_above_it() {
 }
 
 #[test]
-fn thresholds_of_a_prediction_are_used_where_the_settings_have_none() {
+fn thresholds_of_a_prediction_are_used_if_the_settings_have_none() {
     let mut scene = Scene::new(1, 2, &SIZES);
     scene.views[0].sigma_px = Some(vec![5.0; N_PARTS]);
     scene.views[1].sigma_px = Some(vec![5.0; N_PARTS]);

@@ -54,7 +54,7 @@ fn the_released_optimiser_can_cycle_where_the_papers_converges() {
 }
 
 #[test]
-fn a_part_that_is_off_in_the_support_adds_nothing_to_the_target() {
+fn a_part_switched_off_in_the_support_adds_nothing_to_the_target() {
     let mut n_supported = 0;
     for seed in 0..100 {
         let blind = (seed % 2) as usize;
@@ -102,7 +102,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_exchanged(seed: u64) {
+    fn a_mirrored_view_gives_the_same_result_if_its_sides_are_swapped(seed: u64) {
         let mut scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { beta: 0.0, ..released(seed) };
         let plain = scene.fuse(&settings, [0, 1], FROM_BEST);
@@ -116,7 +116,7 @@ proptest! {
     }
 
     #[test]
-    fn without_weight_every_view_keeps_its_own_best(seed: u64) {
+    fn with_zero_weight_every_view_keeps_its_own_best_pose(seed: u64) {
         let scene = Scene::new(seed, 2, &SIZES);
         let settings = Settings { alpha: 0.0, beta: 0.0, ..released(seed) };
         let found = scene.fuse(&settings, [0, 1], FROM_BEST);

@@ -80,7 +80,7 @@ proptest! {
     }
 
     #[test]
-    fn with_one_candidate_the_start_is_that_of_the_paper(seed: u64) {
+    fn with_one_candidate_the_start_equals_that_of_the_paper(seed: u64) {
         let scene = Scene::new(seed, 3, &SIZES);
         let settings = Settings { facing: false, n_candidates: 1, ..settings(seed) };
         let start = chosen(&scene, &settings);
@@ -89,7 +89,7 @@ proptest! {
 }
 
 #[test]
-fn a_view_alone_starts_from_its_best() {
+fn a_single_view_starts_from_its_best_pose() {
     let scene = Scene::new(5, 1, &SIZES);
     let start = chosen(&scene, &settings(5));
     assert_eq!((start.candidates, start.exchanged), (vec![0], vec![false]));

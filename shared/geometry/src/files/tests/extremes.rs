@@ -168,7 +168,7 @@ fn a_rig_in_another_unit_is_an_error_with_its_distances() {
 }
 
 #[test]
-fn cameras_at_one_place_are_an_error() {
+fn cameras_at_the_same_position_are_an_error() {
     let turn = |nth: usize| {
         let mut camera = ring(1, LensModel::Pinhole).remove(0);
         camera.name = format!("cam{nth}");
@@ -204,7 +204,7 @@ fn a_rig_of_one_camera_has_no_findings() {
 }
 
 #[test]
-fn the_unit_of_the_options_applies_to_an_own_file_too() {
+fn the_unit_option_also_applies_to_a_parallax_file() {
     let rig = ring_rig(2, LensModel::Pinhole);
     let options = ReadOptions {
         unit: Some(Unit::Millimetres),

@@ -46,7 +46,7 @@ fn read_lens(name: &str, text: &str) -> (Rig, String) {
 }
 
 #[test]
-fn a_lens_without_a_place_serves_where_the_lens_is_enough() {
+fn a_camera_without_a_pose_is_accepted_if_only_the_lens_is_needed() {
     let json = r#"{"camera_matrix": [[900, 0, 618], [0, 900, 390], [0, 0, 1]], "dist_coeff": [[-0.33, 0.046, -0.0043, 0.0041]],
         "image_width": 1280, "image_height": 720}"#;
     for (name, text, lens) in [
@@ -69,7 +69,7 @@ fn a_lens_without_a_place_serves_where_the_lens_is_enough() {
 }
 
 #[test]
-fn the_keys_of_opencvs_program_and_of_ros_tell_fisheye_lenses() {
+fn keys_of_opencv_and_ros_files_identify_fisheye_lenses() {
     let fisheye = LENS.replace("fisheye_model: 0", "fisheye_model: 1") + PLACE;
     let lens = |text: &str| {
         let rig = opencv::parse(&[("a", text)], &LENSES).unwrap();
@@ -88,7 +88,7 @@ fn the_keys_of_opencvs_program_and_of_ros_tell_fisheye_lenses() {
 }
 
 #[test]
-fn cameras_without_a_place_are_left_out_of_a_rig_of_others() {
+fn cameras_without_a_pose_are_left_out_of_a_rig() {
     let camera = |name: &str, place: &str| {
         format!(
             "[cameras.{name}]\nsize = [1280, 720]\nmatrix = [[900.0, 0.0, 640.0], [0.0, 900.0, 360.0], [0.0, 0.0, 1.0]]
@@ -117,7 +117,7 @@ distortions = [0.0, 0.0, 0.0, 0.0]\n{place}\n"
 }
 
 #[test]
-fn units_are_named_or_lengths() {
+fn units_are_given_by_name_or_as_a_length() {
     let metres = |text: &str| text.parse().map(|unit: Unit| 1.0 / unit.per_metre());
     for (text, expected) in [
         ("m", 1.0),

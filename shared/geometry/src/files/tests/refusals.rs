@@ -31,7 +31,7 @@ fn edited(text: &str, key: &str, line: &str) -> String {
 }
 
 #[test]
-fn errors_of_the_own_format_name_the_field() {
+fn errors_of_the_parallax_format_name_the_field() {
     let with = |key: &str, line: &str| {
         own::parse(&edited(&own_text(), key, line), &ReadOptions::default())
     };

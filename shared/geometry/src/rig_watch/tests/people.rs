@@ -131,7 +131,7 @@ fn reported(real: &[Camera], believed: Vec<Camera>, seed: u64, n_frames: usize) 
 }
 
 #[test]
-fn no_camera_is_reported_where_people_gesture_and_none_was_moved() {
+fn no_camera_is_reported_if_people_gesture_and_no_camera_moved() {
     for seed in 0..20 {
         for n in [3, 4, 5] {
             let cameras = around(n);
@@ -142,7 +142,7 @@ fn no_camera_is_reported_where_people_gesture_and_none_was_moved() {
 }
 
 #[test]
-fn only_a_camera_turned_by_two_degrees_is_reported_where_people_gesture() {
+fn only_a_camera_rotated_by_two_degrees_is_reported_if_people_gesture() {
     let mut wrong = Vec::new();
     for seed in 0..20_u64 {
         for n in [4, 5, 6] {
@@ -227,7 +227,7 @@ fn rigs() -> Vec<Vec<Camera>> {
 }
 
 #[test]
-fn exchanged_footage_of_two_cameras_is_detected() {
+fn swapped_footage_of_two_cameras_is_detected() {
     let mut wrong = Vec::new();
     for (rig, cameras) in rigs().into_iter().enumerate() {
         let n = cameras.len();
@@ -254,7 +254,7 @@ fn exchanged_footage_of_two_cameras_is_detected() {
 }
 
 #[test]
-fn no_exchange_is_reported_where_none_was_made() {
+fn no_swap_is_reported_for_unswapped_footage() {
     let two = ring(2, LensModel::Pinhole);
     for (rig, cameras) in rigs().into_iter().chain([two]).enumerate() {
         let n = cameras.len();
@@ -268,7 +268,7 @@ fn no_exchange_is_reported_where_none_was_made() {
 }
 
 #[test]
-fn cyclically_exchanged_footage_of_three_cameras_is_detected() {
+fn cyclically_swapped_footage_of_three_cameras_is_detected() {
     // In a ring, this would look like two swapped cameras.
     let cameras = rigs().pop().expect("cameras at irregular places");
     for seed in 0..8 {
@@ -283,7 +283,7 @@ fn cyclically_exchanged_footage_of_three_cameras_is_detected() {
 }
 
 #[test]
-fn a_moved_camera_is_not_reported_as_exchanged() {
+fn a_moved_camera_is_not_reported_as_swapped() {
     for seed in 0..20_u64 {
         let cameras = around(4);
         let mut film = Film::new(&cameras, seed, true);

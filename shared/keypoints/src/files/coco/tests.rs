@@ -27,7 +27,7 @@ fn annotation(image: &str, category: u64, keypoints: &str) -> String {
 }
 
 #[test]
-fn frames_of_a_data_set_are_its_images_by_id_and_0_is_not_labelled() {
+fn frames_of_a_data_set_are_images_sorted_by_id_and_visibility_0_means_not_labelled() {
     let keypoints = list(5.0, 2.0).replacen("5,6,2", "0,0,0", 1);
     let all = [
         annotation("30", 1, &keypoints),
@@ -51,7 +51,7 @@ fn frames_of_a_data_set_are_its_images_by_id_and_0_is_not_labelled() {
 }
 
 #[test]
-fn the_category_of_people_gives_the_names_and_others_are_passed_over() {
+fn the_category_person_gives_the_names_and_other_categories_are_ignored() {
     let categories = "{\"id\":1,\"name\":\"person\",\"keypoints\":[\"left_hip\",\"nose\"]},{\"id\":2,\"name\":\"dog\",\
          \"keypoints\":[\"tail\"]},{\"id\":3,\"name\":\"ball\"}";
     let all = [
@@ -88,7 +88,7 @@ fn frames_of_results_are_their_image_ids_as_numbers_or_texts() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_with_its_place() {
+fn impossible_coco_values_are_refused_with_their_place() {
     let one = |image: &str| format!("[{}]", annotation(image, 1, &list(5.0, 0.5)));
     assert!(refused(&one("\"picture\"")).contains("[0].image_id"));
     assert!(refused(&one("99999999999")).contains("a frame number below 10000000"));
@@ -119,7 +119,7 @@ fn a_data_set_without_people_needs_names() {
 }
 
 #[test]
-fn what_other_programs_write_is_refused_in_words() {
+fn unsupported_files_of_other_programs_are_refused_with_an_explanation() {
     let table = refused("scorer,DLC,DLC,DLC\nbodyparts,nose,nose,nose\n");
     assert!(table.contains("begins with \"scorer,DLC"), "{table}");
     // Ultralytics writes a list of people for each frame.

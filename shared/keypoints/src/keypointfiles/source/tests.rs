@@ -28,7 +28,7 @@ fn refused(files: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn frames_of_a_folder_are_counted_from_its_first_file_and_gaps_tell_nothing() {
+fn frames_of_a_folder_are_counted_from_its_first_file_and_missing_files_give_no_result() {
     let folder = folder(&[
         ("cam1_0012_keypoints.json", &frame(&[3.0, 4.0])),
         ("cam1_0010_keypoints.json", &frame(&[])),
@@ -74,7 +74,7 @@ fn a_malformed_file_is_named_and_the_others_are_read() {
 }
 
 #[test]
-fn folders_that_tell_no_frames_are_refused() {
+fn folders_without_frame_numbers_are_refused() {
     assert!(refused(&[]).contains("no file with the extension .json"));
     assert!(refused(&[("a.json", "{}")]).contains("a.json has no frame number"));
     let one = frame(&[1.0]);
@@ -92,7 +92,7 @@ fn folders_that_tell_no_frames_are_refused() {
 }
 
 #[test]
-fn a_camera_that_sees_nobody_needs_names() {
+fn a_camera_without_people_needs_keypoint_names() {
     let folder = folder(&[("1.json", &frame(&[]))]);
     let names = NameSet::of_set("coco-17").unwrap();
     let source = KeypointSource::open(folder.path(), Some(names)).unwrap();
@@ -114,7 +114,7 @@ fn a_file_that_is_too_large_is_not_read() {
 }
 
 #[test]
-fn one_file_in_the_layout_of_coco_has_all_frames() {
+fn one_coco_file_contains_all_frames() {
     let result = |image: u64| {
         format!(
             "{{\"image_id\":{image},\"category_id\":1,\"keypoints\":{:?},\"score\":0.9}}",
@@ -149,7 +149,7 @@ fn upright(names: &[&str]) -> String {
 }
 
 #[test]
-fn the_other_25_keypoints_of_openpose_are_not_taken_for_the_usual_ones() {
+fn the_layout_body_25b_of_openpose_is_distinguished_from_body_25() {
     let usual = upright(&BODY_25);
     let other = upright(&crate::BODY_25B);
     let open = |files: &[(&str, &str)], names: Option<&str>| {

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_to_write_numbers_is_read() {
+    fn every_number_notation_is_parsed() {
         let text = "# by hand\nflow: [1, 2.5, -3e-2,\n  .5, 7., +4]\nblock:\n- 1\n-   2\nrows:\n- - 1\n  - 2\n- [3, 4]\n\
             json: {\"rows\": 1, \"cols\": 2, \"data\": [5, 6]}\nodd: [.nan, -.Inf, .inf]\n";
         let map = parse(text).unwrap();
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_numbers_and_nothing_are_told_apart() {
+    fn texts_numbers_and_empty_values_are_distinguished() {
         let text = "a: '01'\nb: 01\nc: Mon 01 Jan\nd: nan\ne: ~\nf:\ng: true\nh: \"x\\ty\"\ni: 2024-01-02\nj: 0x10\n";
         let map = parse(text).unwrap();
         let text = |text: &str| Entry::Text(text.to_owned());
@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn aliases_repeat_what_they_name_within_limits() {
+    fn aliases_repeat_their_anchors_within_limits() {
         use core::fmt::Write as _;
 
         let map = parse("a: &one [1, 2]\nb: *one\nc: [*one, *one]\n").unwrap();
