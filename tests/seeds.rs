@@ -59,7 +59,7 @@ fn mutate(seed: &[u8], other: &[u8], random: &mut fastrand::Rng) -> Vec<u8> {
 }
 
 #[test]
-fn every_target_stands_its_seeds_and_their_mutations() {
+fn every_fuzz_target_survives_its_seeds_and_their_mutations() {
     for (name, target) in TARGETS {
         let seeds: Vec<Vec<u8>> = names(&folder().join("seeds").join(name))
             .iter()

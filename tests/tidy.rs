@@ -81,7 +81,7 @@ const MAX_LINES: usize = 500;
 const MAX_MAIN_LINES: usize = 100;
 
 #[test]
-fn crates_depend_downwards() {
+fn crates_depend_only_on_lower_layers() {
     let row = |name: &str| LAYERS.iter().position(|(_, row)| row.contains(&name));
     let laboratory = LAYERS.iter().position(|(wing, _)| *wing == "laboratory");
     for (name, dir) in crates() {
@@ -165,7 +165,7 @@ fn examples_in_the_documentation_are_run_and_no_empty_runs_are_made() {
 }
 
 #[test]
-fn unsafe_stays_where_it_is_allowed() {
+fn unsafe_is_used_only_where_it_is_allowed() {
     for (name, dir) in crates() {
         if MAY_BE_UNSAFE.contains(&name.as_str()) {
             continue;
@@ -182,7 +182,7 @@ fn unsafe_stays_where_it_is_allowed() {
 }
 
 #[test]
-fn files_stay_readable() {
+fn files_stay_short_and_documented() {
     for (_, dir) in crates() {
         for file in rust_files(&dir) {
             let text = fs::read_to_string(&file).unwrap();
@@ -204,7 +204,7 @@ fn files_stay_readable() {
 }
 
 #[test]
-fn no_files_import_one_another_in_a_circle() {
+fn files_do_not_import_each_other_in_a_circle() {
     for (name, dir) in crates() {
         let src = dir.join("src");
         let circles = circles::of_crate(&src, &rust_files(&src));
@@ -221,7 +221,7 @@ fn no_files_import_one_another_in_a_circle() {
 const DIALECT: usize = 50;
 
 #[test]
-fn the_old_dialect_goes() {
+fn outdated_style_decreases() {
     let files: Vec<PathBuf> = crates().iter().flat_map(|(_, dir)| rust_files(dir)).collect();
     let n = dialect::count(&files);
     assert!(
@@ -236,7 +236,7 @@ fn the_old_dialect_goes() {
 }
 
 #[test]
-fn no_work_is_left_marked() {
+fn no_unfinished_work_is_marked() {
     // The marks are concatenated from parts, so that the test does not find them in this file.
     let marks = [
         ["TO", "DO"].concat(),
@@ -258,7 +258,7 @@ fn no_work_is_left_marked() {
 }
 
 #[test]
-fn the_tests_that_cargo_leaves_out_run_in_ci() {
+fn ignored_tests_run_in_ci() {
     let ignored = ["#[ign", "ore"].concat();
     let allowed =
         [" = \"takes long\"]", " = \"needs ../shared\"]"].map(|reason| ignored.clone() + reason);
@@ -279,7 +279,7 @@ fn the_tests_that_cargo_leaves_out_run_in_ci() {
 }
 
 #[test]
-fn files_of_users_are_written_through_one_room() {
+fn user_files_are_written_through_one_crate() {
     // The code in these files writes into separate folders, creates new files exclusively, or (for the record of benchmarks) appends to a
     // file.
     let may = [
@@ -315,7 +315,7 @@ fn files_of_users_are_written_through_one_room() {
 }
 
 #[test]
-fn every_crate_is_on_its_map() {
+fn every_crate_is_listed_on_the_maps() {
     for group in ["services", "shared"] {
         let map = fs::read_to_string(root().join(group).join("README.md")).unwrap();
         for entry in fs::read_dir(root().join(group)).unwrap() {
@@ -332,7 +332,7 @@ fn every_crate_is_on_its_map() {
 }
 
 #[test]
-fn only_the_agreed_entries_lie_at_the_top() {
+fn the_top_folder_contains_only_the_agreed_entries() {
     let agreed = [
         ".ci",
         ".gitignore",

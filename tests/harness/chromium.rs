@@ -50,7 +50,7 @@ pub fn check_in_browser(page: &str) {
 
 #[test]
 #[should_panic(expected = "Unexpected token 'export'")]
-fn a_page_with_a_script_that_is_none_is_found() {
+fn a_page_with_an_invalid_script_is_detected() {
     let is_there = Command::new("chromium").arg("--version").output().is_ok();
     assert!(
         is_there,

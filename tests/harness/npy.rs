@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn both_orders_give_the_same_array() {
+    fn row_and_column_order_give_the_same_array() {
         let c = file(
             "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 3), }",
             &[1, 2, 3, 4, 5, 6],
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_it_does_not_know() {
+    fn refuses_unknown_npy_formats() {
         let shape = "'fortran_order': False, 'shape': (2,), }";
         let complex = file(&format!("{{'descr': '<c8', {shape}"), &[0; 16]);
         assert_eq!(parse(&complex).unwrap_err(), "numbers of type <c8");

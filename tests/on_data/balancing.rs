@@ -93,7 +93,7 @@ pub(crate) struct Clip {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn errors_with_uprighting_facing_and_candidates_stay_below_the_figures_reached() {
+fn errors_stay_below_the_recorded_values() {
     let Some(dir) = shared_dir() else { return };
     let rig = rig();
     let data = dir.join("data/pose2sim_balancing");

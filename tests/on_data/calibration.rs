@@ -278,7 +278,7 @@ fn every_rig_in_configs_is_plausible() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn the_refined_rig_fits_the_detections_better_than_the_shipped_one() {
+fn the_refined_rig_fits_the_detections_better_than_the_included_one() {
     let Some(folder) = balancing() else { return };
     let rigs = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"].map(our_rig);
     let [refined, shipped] = rigs.each_ref().map(|rig| fit(&folder, rig));
@@ -300,7 +300,7 @@ fn the_refined_rig_fits_the_detections_better_than_the_shipped_one() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn the_reference_lies_on_the_detections() {
+fn the_reference_joints_lie_on_the_detections() {
     let Some(folder) = balancing() else { return };
     let px = ["pose2sim-balancing.toml", "pose2sim-balancing-shipped.toml"]
         .map(|name| reprojection(&folder, &our_rig(name)));
@@ -339,7 +339,7 @@ fn the_inaccurate_camera_has_the_largest_epipolar_error() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn the_rolls_are_those_of_the_reference_runs() {
+fn the_rolls_equal_those_of_the_reference_runs() {
     let rig = our_rig("pose2sim-balancing.toml");
     let rolls: Vec<f64> = rig
         .cameras()

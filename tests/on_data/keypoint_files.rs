@@ -15,7 +15,7 @@ use crate::shared_dir;
 
 #[test]
 #[ignore = "needs ../shared"]
-fn keypoints_of_the_balancing_person_become_maps_whose_maxima_lie_on_them() {
+fn keypoints_of_the_balancing_person_become_maps_with_maxima_at_the_keypoints() {
     let Some(shared) = shared_dir() else { return };
     let folder = shared.join("data/pose2sim_balancing/openpose");
     for (camera, n_people) in [("cam01", 141), ("cam02", 140), ("cam03", 70), ("cam04", 70)] {

@@ -224,7 +224,7 @@ fn the_released_predictions_are_read_completely() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn the_thresholds_switch_off_the_documented_share_of_parts() {
+fn the_thresholds_switch_off_the_documented_fraction_of_parts() {
     let Some(path) = data("humaneva/error_predictions_he.csv") else {
         return;
     };

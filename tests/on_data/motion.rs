@@ -63,7 +63,7 @@ fn the_six_encodings_of_a_trial_give_the_same_points() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn files_of_other_laboratories_are_read_and_an_empty_one_is_refused() {
+fn files_of_other_laboratories_are_read_and_an_empty_file_is_refused() {
     let Some(dir) = shared_dir() else { return };
     let dir = dir.join("data/c3d/others");
     let walk = read(&dir.join("cmu_02_05.c3d"));

@@ -16,7 +16,7 @@ type Joints = [[f64; 2]; 14];
 
 #[test]
 #[ignore = "needs ../shared"]
-fn the_shipped_model_has_the_accuracy_of_its_card() {
+fn the_included_model_has_the_accuracy_on_its_card() {
     let Some(shared) = shared_dir() else { return };
     let file =
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models/person.fmp");
@@ -56,7 +56,7 @@ const CARD: [f64; 2] = [73.3, 67.4];
 
 #[test]
 #[ignore = "needs ../shared"]
-fn a_person_in_a_box_that_is_too_large_or_beside_it_is_looked_at_again_in_a_better_one() {
+fn a_person_in_a_too_large_or_shifted_box_is_searched_again_in_a_better_box() {
     let Some(shared) = shared_dir() else { return };
     let models = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/models");
     let network = NetworkFile::open(&models.join("person.pose.onnx"), None).unwrap();

@@ -306,7 +306,7 @@ fn pairs(motion: &Motion, setting: Setting, n_draws: u64) -> Vec<Pairs> {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn two_to_eight_people_are_told_apart_in_the_views_of_real_cameras() {
+fn two_to_eight_people_are_distinguished_in_the_views_of_real_cameras() {
     let Some(shared) = shared_dir() else { return };
     let motion = Motion::read(&shared.join("data/panoptic_motion"));
     assert_eq!((motion.cameras.len(), motion.clips.len()), (31, 6));

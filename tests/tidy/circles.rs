@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_lead_back_to_where_they_were_needed_are_a_circle() {
+    fn files_that_import_each_other_form_a_circle() {
         let files = [
             ("lib.rs", "mod a;\nmod b;\nmod c;\nmod d;\n"),
             ("a.rs", "use crate::b::{self, B};\n"),
@@ -329,7 +329,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parent_and_its_children_are_one_place() {
+    fn a_parent_module_and_its_children_count_as_one() {
         let child = "use super::A;\nfn f(_: super::super::a::A) {}\n";
         for parent in ["a.rs", "a/mod.rs"] {
             let files = [

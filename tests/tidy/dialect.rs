@@ -32,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_are_counted() {
+    fn places_with_outdated_style_are_counted() {
         assert_eq!(
             in_line("    let names = all.iter().map(|it| it.name).filter(|it| true);"),
             2

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_may_not_be_made_is_not_made_for_want_of_another() {
+    fn a_forbidden_pair_is_never_assigned() {
         let assigned = assign(2, 1, |row, _| [NEVER, 0.5][row]);
         assert_eq!(assigned, [None, Some(0)]);
     }

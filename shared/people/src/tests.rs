@@ -86,7 +86,7 @@ fn exchanged(colours: [Option<[f64; 3]>; 2]) -> [Vec<u64>; 2] {
 }
 
 #[test]
-fn people_who_exchange_their_places_unseen_keep_their_ids_by_their_colours() {
+fn people_who_swap_places_unseen_keep_their_ids_by_their_colours() {
     let [before, after] = exchanged([Some([0.7, 0.3, 0.2]), Some([0.2, 0.3, 0.6])]);
     assert_eq!(before.len(), 2);
     assert_eq!(after, [before[1], before[0]]);
@@ -156,7 +156,7 @@ proptest! {
     }
 
     #[test]
-    fn a_detection_is_one_persons_and_an_id_is_never_given_to_another(seed in any::<u64>(), n_people in 1_usize..7, n_views in 2_usize..6) {
+    fn a_detection_belongs_to_one_person_and_an_id_is_never_reused(seed in any::<u64>(), n_people in 1_usize..7, n_views in 2_usize..6) {
         let frames = walk(seed, n_people, 30, n_views);
         let (mut known, mut last) = (BTreeSet::new(), 0);
         for people in follow(n_views, &frames) {
@@ -176,7 +176,7 @@ proptest! {
     }
 
     #[test]
-    fn a_tracker_that_takes_up_the_work_of_another_goes_on_with_the_same_people(seed in any::<u64>(), n_people in 1_usize..5) {
+    fn a_restored_tracker_continues_with_the_same_people(seed in any::<u64>(), n_people in 1_usize..5) {
         // All people are present from the start, so no track is about to be confirmed.
         let actors: Vec<Actor> = (0..n_people).map(|nth| Actor { at: [nth as f64 - 1.5, 0.3], turn: nth as f64, stature: 1.7 }).collect();
         let mut random = Rng::with_seed(seed);
@@ -234,7 +234,7 @@ fn two_who_pass_each_other_keep_their_ids() {
 }
 
 #[test]
-fn who_comes_back_is_known_by_the_bones_and_a_stranger_is_not() {
+fn a_returning_person_is_recognised_by_bone_lengths_and_a_stranger_is_not() {
     let mut random = Rng::with_seed(2);
     let at = |stature: f64| Actor {
         at: [0.2, 0.0],
@@ -256,7 +256,7 @@ fn who_comes_back_is_known_by_the_bones_and_a_stranger_is_not() {
 }
 
 #[test]
-fn somebody_new_is_given_in_the_third_frame_and_at_once_where_nobody_was_known() {
+fn a_new_person_is_reported_in_the_third_frame_or_at_once_if_nobody_was_known() {
     let mut random = Rng::with_seed(3);
     let [one, other] = [[-0.8, 0.0], [0.8, 0.0]].map(|at| Actor {
         at,
@@ -279,7 +279,7 @@ fn somebody_new_is_given_in_the_third_frame_and_at_once_where_nobody_was_known()
 }
 
 #[test]
-fn one_view_alone_keeps_a_person_but_is_unsure() {
+fn a_single_view_keeps_a_person_with_less_certainty() {
     let mut random = Rng::with_seed(4);
     let actor = Actor {
         at: [0.0, 0.0],
@@ -302,7 +302,7 @@ fn one_view_alone_keeps_a_person_but_is_unsure() {
 }
 
 #[test]
-fn sides_that_views_call_as_they_see_them_are_found() {
+fn sides_as_seen_by_the_views_are_resolved() {
     let mut random = Rng::with_seed(5);
     let actor = Actor {
         at: [0.0, 0.0],
@@ -328,7 +328,7 @@ fn sides_that_views_call_as_they_see_them_are_found() {
 }
 
 #[test]
-fn joints_are_found_by_what_the_detector_gave_to_nobody() {
+fn unassigned_keypoints_fill_missing_joints() {
     let mut random = Rng::with_seed(6);
     let actor = Actor {
         at: [0.0, 0.0],
@@ -358,7 +358,7 @@ fn joints_are_found_by_what_the_detector_gave_to_nobody() {
 }
 
 #[test]
-fn whom_two_of_four_views_see_is_somebody_after_six_frames() {
+fn a_person_seen_by_two_of_four_views_is_reported_after_six_frames() {
     let mut random = Rng::with_seed(7);
     let [one, other] = [[-0.8, 0.0], [0.8, 0.0]].map(|at| Actor {
         at,
@@ -384,7 +384,7 @@ fn whom_two_of_four_views_see_is_somebody_after_six_frames() {
 }
 
 #[test]
-fn who_turns_up_where_somebody_is_missed_is_that_person() {
+fn a_person_who_appears_where_another_was_lost_keeps_the_id() {
     let mut random = Rng::with_seed(8);
     let at = |x: f64| Actor {
         at: [x, 0.0],

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_trunk_gives_the_colour_and_the_background_does_not() {
+    fn the_colour_is_measured_on_the_trunk_and_not_on_the_background() {
         let data = picture();
         let image = Rgb8View::new(40, 40, &data).unwrap();
         let front = person([[13.0, 9.0], [27.0, 9.0]], [[15.0, 29.0], [25.0, 29.0]]);
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trunk_that_is_not_seen_has_no_colour() {
+    fn an_unseen_trunk_has_no_colour() {
         let data = picture();
         let image = Rgb8View::new(40, 40, &data).unwrap();
         let mut half = person([[13.0, 9.0], [27.0, 9.0]], [[15.0, 29.0], [25.0, 29.0]]);

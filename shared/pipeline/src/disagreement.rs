@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_covariance_grows_with_what_the_two_best_views_disagree_by() {
+    fn the_covariance_grows_with_the_disagreement_of_the_two_best_views() {
         let noise = Matrix3::from_diagonal_element(1e-4);
         let sd = |disagreements: &[f64]| {
             let wide = widened(&noise, &mut disagreements.to_vec());
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_median_is_of_what_is_known() {
+    fn the_median_ignores_missing_values() {
         assert_eq!(median(&[f64::NAN, 3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&[f64::NAN]), None);
     }

@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn the_person_of_the_last_frame_is_followed_even_where_another_is_clearer() {
+    fn the_person_of_the_last_frame_is_followed_even_if_another_is_clearer() {
         let frames: [&[([f64; 2], f64)]; 4] = [
             &[([-0.5, 0.0], 1.0), ([1.0, 0.5], 0.8)],
             &[([-0.3, 0.0], 0.6), ([1.0, 0.5], 1.0)],
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_candidates_of_the_one_who_is_followed_are_told() {
+    fn the_candidates_of_the_followed_person_are_known_for_every_view() {
         // The order of the people differs from view to view.
         let people: &[([f64; 2], f64)] = &[([-0.5, 0.0], 1.0), ([1.0, 0.5], 0.8)];
         let cameras: Vec<_> = (0..4).map(camera).collect();
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn somebody_else_is_followed_once_the_person_has_been_away_for_long() {
+    fn another_person_is_followed_after_the_person_has_been_away_for_long() {
         let both: &[([f64; 2], f64)] = &[([-1.0, 0.0], 1.0), ([1.0, 0.0], 0.6)];
         let one: &[([f64; 2], f64)] = &[([1.0, 0.0], 0.6)];
         let n = MOST_PATIENCE as usize;
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn an_identity_stays_while_the_person_is_followed_and_is_never_given_to_another() {
+    fn an_id_lasts_while_the_person_is_followed_and_is_never_reused() {
         let both: &[([f64; 2], f64)] = &[([-1.0, 0.0], 1.0), ([1.0, 0.0], 0.6)];
         let one: &[([f64; 2], f64)] = &[([1.0, 0.0], 0.6)];
         let cameras: Vec<_> = (0..4).map(camera).collect();
@@ -222,13 +222,13 @@ mod tests {
     }
 
     #[test]
-    fn something_that_was_seen_once_holds_nobody_up() {
+    fn a_single_false_detection_does_not_delay_following_a_person() {
         let frames: [&[([f64; 2], f64)]; 2] = [&[([-1.0, 0.0], 0.3)], &[([1.0, 0.0], 1.0)]];
         assert_eq!(chosen(Follow::Last, &frames), [Some(-1.0), Some(1.0)]);
     }
 
     #[test]
-    fn the_largest_is_the_one_that_is_large_in_the_pictures() {
+    fn the_largest_person_is_the_one_largest_in_the_pictures() {
         // The first camera is at x = 5 m; the other cameras surround the people.
         let near_and_far: &[([f64; 2], f64)] = &[([0.0, 0.0], 1.0), ([1.2, 1.2], 0.7)];
         let cameras: Vec<_> = (0..3).map(camera).collect();
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_followed_where_nobody_is() {
+    fn nobody_is_followed_in_an_empty_room() {
         assert_eq!(chosen(Follow::Last, &[&[], &[]]), [None, None]);
     }
 }

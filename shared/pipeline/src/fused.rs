@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn all_views_at_once_rank_facing_by_their_energies() {
+    fn with_all_views_at_once_facings_are_ranked_by_energy() {
         let result = result();
         let got = Fused::AllViews(&result).facing(0b11110);
         assert_eq!(got, [(0b00100, 5.0), (0b10000, 3.0)]);

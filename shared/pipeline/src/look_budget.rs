@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_budget_is_what_the_cores_manage_between_two_frames() {
+    fn the_budget_is_the_number_of_network_runs_that_the_cores_manage_between_two_frames() {
         let mut budget = LookBudget::new(0.5, 1.0 / 15.0);
         assert_eq!(budget.looks(), None, "nothing is known yet");
         budget.spent(4.0, [0.04, 0.05]);

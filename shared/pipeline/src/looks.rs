@@ -418,7 +418,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_box_of_a_detector_is_of_the_person_whose_box_it_covers_most() {
+    fn a_detector_box_is_assigned_to_the_person_with_the_largest_overlap() {
         let person = [100.0, 50.0, 180.0, 250.0];
         let shifted = |by: f64| [person[0] + by, person[1], person[2] + by, person[3]];
         assert_eq!(best_box(&[shifted(20.0), shifted(5.0)], person), Some(1));

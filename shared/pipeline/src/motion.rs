@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn every_view_is_moved_by_its_own_velocity_and_its_own_time() {
+    fn joints_of_every_view_are_moved_by_their_own_velocity_and_time() {
         let mut motion = Motion::default();
         let answers = [Some(answer(0.01)), Some(answer(-0.01)), None];
         motion.begin(Some(1.0));
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_were_seen_some_frames_ago_move_on_with_their_last_velocity() {
+    fn points_seen_some_frames_ago_are_moved_by_their_last_velocity() {
         let mut motion = Motion::default();
         let points = |x: f64| vec![Some(Point2::new(x, 0.0)), Some(Point2::new(x, 200.0))];
         let mut since = |instant_s: f64, age_s: f64, x: f64| {
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_moved_where_all_pictures_are_of_the_instant_or_no_time_is_known() {
+    fn nothing_is_moved_if_all_pictures_show_the_instant_or_times_are_unknown() {
         let mut motion = Motion::default();
         let views = [Some(view(10.0)), Some(view(30.0))];
         motion.begin(Some(1.0));

@@ -333,7 +333,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_are_looked_for_after_frames_that_are_missing() {
+    fn many_missing_frames_trigger_a_search_for_people() {
         let after = |frames: &[u64], most_apart: Option<f64>| {
             let mut memory = NetworkMemory {
                 until: Some(7),
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_are_looked_for_often_where_people_may_hide_each_other_and_after_one_was_lost() {
+    fn searches_are_more_frequent_if_people_may_hide_each_other_or_one_was_lost() {
         let seen = |lefts: &[f64]| NetworkMemory {
             seen: lefts
                 .iter()
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_in_which_nobody_was_seen_is_due_again_in_the_fourth_search() {
+    fn an_empty_box_is_searched_again_in_the_fourth_search() {
         let mut memory = NetworkMemory::default();
         memory.empty.push(Empty {
             outline: [0.0, 0.0, 40.0, 100.0],
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_after_a_searched_one_is_not_searched_because_that_took_long() {
+    fn a_slow_search_does_not_cause_a_search_of_the_next_frame() {
         let mut memory = NetworkMemory {
             until: Some(7),
             ..NetworkMemory::default()
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn a_person_who_stands_still_is_looked_at_by_time_and_in_every_frame_without_a_rate() {
+    fn a_still_person_is_observed_at_time_intervals_or_without_a_rate_in_every_frame() {
         let hold = |most_apart: Option<f64>, frames: [u64; 2]| {
             let mut memory = NetworkMemory::default();
             for frame in frames {
@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_that_are_left_are_kept_for_the_next_frame_and_no_longer() {
+    fn unused_network_runs_are_kept_for_one_frame_only() {
         let mut memory = NetworkMemory::default();
         memory.allow(Some(1.5));
         assert_eq!(memory.credit, None, "no rate is known");
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_waits_for_runs_but_not_for_ever() {
+    fn a_search_waits_a_limited_time_for_network_runs() {
         let mut memory = NetworkMemory {
             until: Some(0),
             ..NetworkMemory::default()

@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_side_moves_outward_at_once_and_inward_step_by_step() {
+    fn a_side_of_the_box_moves_outward_at_once_and_inward_gradually() {
         let around = [90.0, 150.0, 170.0, 260.0];
         let next = Track::next(((BOX, Turn::Up), None), (around, -20.0), 6.0);
         assert_eq!(next.outline, [90.0, 100.0, 175.0, 260.0]);
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_is_much_worse_than_usual_moves_no_side() {
+    fn a_much_worse_pose_than_usual_does_not_move_the_box() {
         let legs = [120.0, 150.0, 200.0, 250.0];
         let next = Track::next(((BOX, Turn::Up), Some(-18.0)), (legs, -25.0), 6.0);
         assert_eq!(next.outline, BOX);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_still_is_where_the_last_look_was_for_as_long_as_the_speed_allows() {
+    fn a_still_person_keeps_the_last_position_as_long_as_the_speed_allows() {
         let track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -18.0), 6.0);
         assert!(!track.is_still(1), "one look tells no pace");
         let with = |speed: f64| Track {
@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn the_network_runs_first_on_the_person_who_may_have_moved_farthest() {
+    fn the_network_runs_first_on_the_person_with_the_largest_possible_movement() {
         let track = Track::next(((BOX, Turn::Up), None), (BOX, -20.0), 6.0);
         let with = |speed: f64| Track {
             pace: Some(Pace::next(None, &by([speed, 0.0]), 1)),
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_of_the_network_are_no_movement_and_steps_are() {
+    fn network_noise_does_not_count_as_movement_and_steps_do() {
         let after = |moved: &[f64]| {
             let looks = moved.iter().fold(None, |before, moved| {
                 Some(Pace::next(before, &by([*moved, 0.0]), 1))
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_on_one_leg_and_swings_the_other_one_is_no_more_still() {
+    fn a_person_who_swings_one_leg_does_not_count_as_still() {
         let swing = |swing: Option<f64>| {
             let mut moved = by([0.0; 2]);
             moved.joints[3] = swing.map(|swing| [swing, 0.0]);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_worse_becomes_usual() {
+    fn a_lasting_lower_score_becomes_the_usual_one() {
         let mut track = Track::next(((BOX, Turn::Up), Some(-18.0)), (BOX, -30.0), 6.0);
         let mut n_doubtful = 0;
         while track.is_doubtful {
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn who_may_have_moved_on_is_in_a_box_that_grows_with_the_time() {
+    fn the_box_of_a_moving_person_grows_with_time() {
         assert_eq!(moved(BOX, 1.5), [-50.0, -100.0, 330.0, 400.0]);
         assert_eq!(moved(BOX, 90.0), [-100.0, -150.0, 380.0, 450.0]);
     }

@@ -41,7 +41,7 @@ fn run(step: &ViewStep, scope: Scope) -> (ViewEstimate, Vec<f32>) {
 }
 
 #[test]
-fn the_gpu_finds_what_the_processor_finds_and_the_processor_goes_on_when_it_is_lost() {
+fn the_gpu_finds_the_same_as_the_cpu_and_the_cpu_continues_if_the_gpu_is_lost() {
     let device = match Device::open(Choice::Any) {
         Ok(device) => Arc::new(device),
         Err(error) => return eprintln!("skipped: {error}"),

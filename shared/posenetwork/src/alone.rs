@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn who_lies_or_stands_on_the_hands_is_turned() {
+    fn pictures_of_lying_people_and_handstands_are_rotated() {
         for (turned, expected) in [
             (STANDING, Turn::Up),
             (STANDING.map(|[x, y]| [-x, -y]), Turn::Down),
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn who_bends_down_is_not() {
+    fn pictures_of_people_who_bend_down_are_not_rotated() {
         let mut bent = STANDING;
         for at in &mut bent[6..] {
             *at = [-at[1], at[0] + 10.0];
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_seen_from_the_feet_stays_as_turned() {
+    fn the_rotation_is_kept_for_a_person_seen_from_the_feet() {
         let flat = STANDING.map(|[x, y]| [4.0 * x, 0.05 * y]);
         assert_eq!(maps(flat).turn(Turn::Up), Turn::Up);
         assert_eq!(maps(flat).turn(Turn::Left), Turn::Left);

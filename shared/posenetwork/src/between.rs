@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_map_has_its_own_values_at_cells_and_those_of_a_plane_between_them() {
+    fn a_map_interpolates_linearly_between_its_cells() {
         let (columns, rows) = (7, 5);
         let plane = |x: f64, y: f64| (0.5 * x - 0.3 * y) as f32;
         let map: Vec<f32> = (0..columns * rows)

@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bar_ends_in_half_circles() {
+    fn a_bar_has_round_ends() {
         let bar = Bar {
             ends: [[10.0, 10.0], [30.0, 10.0]],
             radius: 4.0,
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_painted_has_the_colour_beyond_the_picture_and_all_else_stays() {
+    fn painted_areas_have_the_border_colour_and_other_pixels_are_unchanged() {
         let card = Card::parse(
             "format = \"parallax-keypoint-network\"\nversion = 1\nname = \"n\"\n\
              [input]\nwidth = 32\nheight = 40\nmean = [110.0, 110.0, 110.0]\nstd = [60.0, 60.0, 60.0]\n\

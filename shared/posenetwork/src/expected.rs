@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whoever_is_surer_errs_less() {
+    fn a_higher_heat_gives_a_lower_expected_error() {
         assert_eq!(expected_error(0.0), 0.17);
         assert_eq!(expected_error(0.25), 0.095);
         assert_eq!(expected_error(2.0), 0.015);

@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_overlap_by_what_both_cover() {
+    fn the_overlap_of_boxes_is_their_common_area() {
         let a = [0.0, 0.0, 2.0, 2.0];
         assert_eq!(overlap(a, a), 1.0);
         assert_eq!(overlap(a, [1.0, 0.0, 3.0, 2.0]), 2.0 / 6.0);

@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn another_format_or_an_invalid_number_is_refused_with_its_value() {
+    fn an_unknown_format_or_an_invalid_number_is_refused_with_its_value() {
         let refused = |key: &str, value: &str| {
             let mut map = about().to_map();
             map.insert(key.to_owned(), value.to_owned());

@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_of_another_version_is_told_from_a_foreign_one() {
+    fn a_topic_of_another_version_is_distinguished_from_an_unknown_topic() {
         assert!(Kind::ViewPose.is_of_another_version("view-pose/v5/0"));
         assert!(Kind::Skeletons.is_of_another_version("skeletons/v0"));
         for other in ["view-pose/v8/0", "skeletons/v0", "metrics/v0/a", "camera"] {

@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_holds_the_people_there_are_and_no_more() {
+    fn a_recorded_message_contains_only_the_people_present() {
         let mut skeletons = Box::<Skeletons>::default();
         skeletons.stamp.frame = 7;
         for (nth, person) in skeletons.people.iter_mut().enumerate() {
@@ -295,7 +295,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_a_message_or_refused(kind in prop::sample::select(Kind::ALL.to_vec()), n in 0_usize..400, fill: u8) {
+        fn any_bytes_are_parsed_as_a_message_or_refused(kind in prop::sample::select(Kind::ALL.to_vec()), n in 0_usize..400, fill: u8) {
             let mut data = vec![fill; n];
             if n >= 4 { data[..4].copy_from_slice(&PREAMBLE); }
             if let Ok(it) = Message::parse(kind, &data) {

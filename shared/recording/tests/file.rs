@@ -249,7 +249,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn a_prefix_holds_a_prefix(sent in any_sent(), flush_every in 1_usize..8, share in 0.0..1.0) {
+    fn a_prefix_of_the_file_contains_a_prefix_of_the_messages(sent in any_sent(), flush_every in 1_usize..8, share in 0.0..1.0) {
         let file = written(&sent, flush_every);
         let part = &file[..(file.len() as f64 * share) as usize];
         if let Ok(recording) = scan(&mut Cursor::new(part)) {
@@ -340,7 +340,7 @@ fn check_damaged(whole: &[u8], changed: &[u8]) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn frames_of_messages_are_known_where_the_names_of_topics_stand_only_at_the_end() {
+fn frame_numbers_are_read_even_if_topic_names_are_only_at_the_end() {
     let sent = [(1, 0, vec![]), (1, 0, vec![]), (0, 0, vec![])];
     let whole = written(&sent, 1);
     let mut file = whole.clone();
@@ -423,7 +423,7 @@ fn damage_between_two_chunks_loses_no_later_chunk() {
 }
 
 #[test]
-fn a_chunk_that_claims_a_terabyte_takes_no_memory_and_loses_itself_only() {
+fn a_chunk_that_claims_a_terabyte_allocates_nothing_and_only_its_messages_are_lost() {
     let sent: Vec<Sent> = (0..6).map(|nth| (0, nth, vec![nth as u8; 100])).collect();
     let mut file = written(&sent, 1);
     let recording = scan(&mut Cursor::new(&file)).unwrap();
@@ -436,7 +436,7 @@ fn a_chunk_that_claims_a_terabyte_takes_no_memory_and_loses_itself_only() {
 }
 
 #[test]
-fn a_damaged_end_is_told_and_loses_no_message() {
+fn a_damaged_end_is_reported_and_loses_no_message() {
     let (sent, whole) = (some(), written(&some(), 4));
     let end = whole.len();
     // Damage the closing magic, the checksum of the index, the index, and the record that ends the messages.

@@ -45,7 +45,7 @@ fn written() -> Vec<u8> {
 }
 
 #[test]
-fn other_programs_find_their_schemas_and_messages() {
+fn messages_of_other_programs_have_schemas() {
     let file = written();
     let summary = mcap::Summary::read(&file).unwrap().unwrap();
     assert_eq!(summary.stats.unwrap().message_count, 9);
@@ -71,7 +71,7 @@ fn other_programs_find_their_schemas_and_messages() {
 }
 
 #[test]
-fn they_are_no_topics_of_ours_and_nothing_is_missing_or_damaged() {
+fn messages_for_other_programs_do_not_count_as_topics_of_the_run() {
     let file = written();
     let recording = scan(&mut Cursor::new(&file)).unwrap();
     assert_eq!(recording.tracks.len(), 1);
@@ -81,7 +81,7 @@ fn they_are_no_topics_of_ours_and_nothing_is_missing_or_damaged() {
 }
 
 #[test]
-fn a_file_that_is_cut_off_among_them_holds_ours_up_to_there() {
+fn a_file_truncated_among_them_contains_the_messages_before_that() {
     let file = written();
     let mut most = 0;
     for n in 8..=file.len() {

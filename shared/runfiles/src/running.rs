@@ -118,13 +118,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_among_other_entries() {
+    fn a_written_entry_is_read_among_other_entries() {
         let text = serde_json::json!({ "deployment": {}, "programs": running() }).to_string();
         assert_eq!(Running::read(&text).unwrap(), running());
     }
 
     #[test]
-    fn another_version_and_no_description_are_told_apart() {
+    fn another_version_and_a_missing_description_are_distinguished() {
         let other = Running {
             format: 7,
             ..running()

@@ -33,7 +33,7 @@ fn files_of_a_run_are_read_and_written_back_byte_for_byte() {
 }
 
 #[test]
-fn a_frame_without_a_result_says_why_and_a_joint_without_a_position_too() {
+fn missing_results_and_joints_have_a_reason() {
     let [without, partial, whole] = &read::<FrameLine>(POSE3D)[..] else {
         panic!("three lines")
     };
@@ -92,7 +92,7 @@ fn a_missing_or_wrong_field_is_an_error_that_names_it() {
 }
 
 #[test]
-fn an_error_says_where_and_what_was_found() {
+fn errors_contain_the_place_and_the_value_found() {
     let broken = SUMMARY.replace("\"frames_missed\": ", "\"frames_missed\": -");
     let error = RunSummary::parse(&broken).unwrap_err().to_string();
     assert!(
@@ -129,7 +129,7 @@ fn line_of(ids: &[u64]) -> String {
 }
 
 #[test]
-fn a_line_has_at_most_eight_people_each_with_an_identity_of_its_own() {
+fn a_line_has_at_most_eight_people_with_unique_ids() {
     for ids in [&[][..], &[3], &[7, 2], &[1, 2, 3, 4, 5, 6, 7, u64::MAX]] {
         let lines = read::<FrameLine>(&line_of(ids));
         let found = lines[0].people.iter().map(|person| person.id);
@@ -194,7 +194,7 @@ fn a_field_of_a_person_that_is_missing_or_wrong_is_an_error_that_names_it() {
 }
 
 #[test]
-fn a_summary_of_another_version_is_refused_and_still_says_of_which_run_it_is() {
+fn a_summary_of_another_version_is_refused_but_its_session_is_readable() {
     let other = SUMMARY.replace("\"schema_version\": 2", "\"schema_version\": 9");
     let error = RunSummary::parse(&other).unwrap_err().to_string();
     assert!(error.contains("version 9"), "{error}");
@@ -203,13 +203,13 @@ fn a_summary_of_another_version_is_refused_and_still_says_of_which_run_it_is() {
 }
 
 #[test]
-fn unknown_fields_are_passed_over() {
+fn unknown_fields_are_ignored() {
     let more = TIMES.replace("{\"epoch\"", "{\"a\":[1],\"epoch\"");
     assert_eq!(read::<TimesLine>(&more), read::<TimesLine>(TIMES));
 }
 
 #[test]
-fn numbers_that_are_none_are_null() {
+fn numbers_that_are_not_finite_become_null() {
     let mut line = read::<FrameLine>(POSE3D).pop().unwrap();
     let Some(JointLine::Placed(joint)) = line.people[0].joints.get_mut("head") else {
         panic!("a head")
@@ -249,7 +249,7 @@ fn fields_are_declared_in_the_order_in_which_they_are_written() {
 
 proptest! {
     #[test]
-    fn reasons_and_times_read_back(
+    fn reasons_and_times_survive_a_round_trip(
         reason in "[a-z ]{0,20}",
         epoch: u32,
         sent_ms in 0.0..1e12_f64,

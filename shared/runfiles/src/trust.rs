@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn few_results_are_judged_by_what_is_impossible_alone() {
+    fn few_results_are_checked_only_for_impossible_values() {
         let few = Trust {
             frames: 1,
             sides_unsure: 1.0,

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_note_that_was_not_written_to_its_end_the_one_before_is_left() {
+    fn an_incompletely_saved_note_leaves_the_previous_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.place");
         let mut place = Place::new(path.clone());

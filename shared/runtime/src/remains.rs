@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_directory_without_marker_is_reported_and_kept() {
+    fn a_directory_without_a_marker_file_is_reported_and_kept() {
         let base = base();
         let photos = base.path().join("photos");
         fs::create_dir(&photos).unwrap();

@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn capabilities_are_bits_of_the_mask() {
+    fn capabilities_are_decoded_from_the_mask() {
         let status = "Name:\tx\nCapPrm:\tffffffffffffffff\nCapEff:\t0000000000004000\n";
         assert!(has_capability(status, 14));
         assert!(!has_capability(status, 13) && !has_capability(status, 15));

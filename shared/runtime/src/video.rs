@@ -60,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_named_as_users_write_them() {
+    fn formats_have_the_names_that_users_write() {
         for (text, expected) in [
             ("mjpeg", Some(*b"MJPG")),
             ("yuyv", Some(*b"YUYV")),

@@ -112,7 +112,7 @@ fn chunks_of_a_dropped_receiver_are_released() {
 }
 
 #[test]
-fn a_sender_gives_up_on_a_chunk_that_is_never_released() {
+fn a_sender_stops_waiting_for_a_chunk_that_is_never_released() {
     let deployment = Deployment::new(&[plan(Delivery::Lossless)]);
     let (publisher, subscriber) = full(&deployment, Duration::from_millis(100));
     let held = subscriber.receive().unwrap().unwrap();

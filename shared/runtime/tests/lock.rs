@@ -78,7 +78,7 @@ fn a_deployment_with_a_living_process_is_not_removed() {
 }
 
 #[test]
-fn the_longest_root_has_room_for_sockets() {
+fn the_longest_allowed_root_leaves_room_for_socket_names() {
     let base = tempfile::Builder::new().prefix("px").tempdir_in("/tmp").unwrap();
     let pad = 50 - base.path().as_os_str().len() - "//nn".len();
     let longest = base.path().join("b".repeat(pad));

@@ -69,7 +69,7 @@ fn a_sender_without_loss_does_not_wait_for_onlookers_and_its_receiver_gets_every
 }
 
 #[test]
-fn an_onlooker_is_not_woken_and_sees_the_newest() {
+fn an_onlooker_is_not_woken_and_gets_the_newest_message() {
     let deployment = Deployment::new(&topics(Delivery::Realtime));
     let bus = deployment.bus("sender");
     let publisher = bus.publisher::<ViewQuality>("small").unwrap();

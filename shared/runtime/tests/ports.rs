@@ -92,7 +92,7 @@ fn a_dropped_loan_is_not_sent() {
 }
 
 #[test]
-fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
+fn a_slow_receiver_gets_the_newest_message_and_the_sender_never_waits() {
     let deployment = Deployment::new(&[frames(Delivery::Realtime, 8)]);
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
@@ -118,7 +118,7 @@ fn a_slow_receiver_gets_the_newest_and_the_sender_never_waits() {
 }
 
 #[test]
-fn a_receiver_that_may_borrow_one_array_gets_the_newest() {
+fn a_receiver_that_may_hold_one_array_gets_the_newest() {
     let limits = Limits::new(1, 3, 1);
     let plan =
         TopicPlan::slices::<u8, FrameHeader>("frames".to_owned(), Delivery::Realtime, limits, 8);
@@ -187,7 +187,7 @@ fn an_earlier_subscriber_counts_once_it_is_connected() {
 }
 
 #[test]
-fn a_receiver_that_was_given_up_is_waited_for_no_longer_than_later_on() {
+fn an_abandoned_receiver_is_waited_for_only_as_long_as_after_losses() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 2)]);
     let sender = deployment.bus("sender");
     let publisher = sender.publisher::<ViewQuality>("small").unwrap();
@@ -205,7 +205,7 @@ fn a_receiver_that_was_given_up_is_waited_for_no_longer_than_later_on() {
 }
 
 #[test]
-fn a_sender_that_waits_for_room_stops_on_request() {
+fn a_sender_that_waits_for_a_receiver_stops_on_request() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
     let (publisher, subscriber, waiter) = blocked(&deployment, Duration::from_mins(10));
     let stop = deployment.stop().clone();
@@ -222,7 +222,7 @@ fn a_sender_that_waits_for_room_stops_on_request() {
 }
 
 #[test]
-fn a_sender_gives_up_on_a_receiver_that_never_makes_room() {
+fn a_sender_stops_waiting_for_a_receiver_that_never_frees_a_chunk() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 1)]);
     let (publisher, subscriber, waiter) = blocked(&deployment, Duration::from_millis(100));
     let error = publisher.send(&quality(2)).unwrap_err();

@@ -60,7 +60,7 @@ fn with_ports(use_it: impl FnOnce(&Deployment)) {
 }
 
 #[test]
-fn files_are_closed_to_others_whatever_the_umask() {
+fn files_are_private_for_every_umask() {
     umask(Mode::empty());
     with_ports(|deployment| {
         let root = deployment.namespace().root();
@@ -258,7 +258,7 @@ fn a_directory_without_marker_is_named_and_not_changed() {
 }
 
 #[test]
-fn a_base_that_others_may_write_is_closed() {
+fn write_permission_of_others_is_removed_from_the_base_directory() {
     let base = tempfile::tempdir_in("/dev/shm").unwrap();
     let mode = || fs::metadata(base.path()).unwrap().mode() & 0o7777;
     fs::set_permissions(base.path(), Permissions::from_mode(0o777)).unwrap();

@@ -57,7 +57,7 @@ fn every_receiver_reads_pixels_in_place() {
 }
 
 #[test]
-fn kept_arrays_are_counted_as_copies() {
+fn arrays_that_are_kept_count_as_copies() {
     let deployment = deployment();
     let (camera, recorder) = (deployment.bus("camera"), deployment.bus("recorder"));
     let mut waiter = recorder.waiter();

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn every_flaw_has_the_requested_size_and_none_changes_nothing() {
+    fn every_flaw_has_the_requested_size_and_without_flaws_nothing_changes() {
         let plain = degraded(Flaws::default());
         let mean =
             |rgb: &[u8]| rgb.iter().map(|rgb| f64::from(*rgb)).sum::<f64>() / rgb.len() as f64;

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn forks_for_purposes_and_numbers_differ() {
+    fn random_streams_for_different_purposes_and_numbers_differ() {
         let random = Random::new(1);
         let mut all: Vec<u64> = ["a", "b"]
             .map(|name| random.fork(name).bits())
@@ -136,7 +136,7 @@ mod tests {
         }
 
         #[test]
-        fn a_range_is_kept(seed: u64, low in -5.0..0.0, high in 0.1..5.0) {
+        fn random_numbers_stay_in_their_range(seed: u64, low in -5.0..0.0, high in 0.1..5.0) {
             let at = Random::new(seed).range(low, high);
             prop_assert!((low..high).contains(&at));
         }

@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn presets_have_the_cameras_of_their_names() {
+    fn presets_have_the_number_of_cameras_in_their_names() {
         let rig = RigChoice::HumanEva.rig().unwrap();
         assert_eq!(rig.cameras().len(), 3);
         assert!(rig.cameras().iter().all(|camera| camera.intrinsics.size == [640, 480]));

@@ -302,7 +302,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_of_invalid_addresses_name_the_cause() {
+    fn errors_of_invalid_scene_addresses_name_the_cause() {
         let cases = [
             ("http://x", "begins with synth://"),
             ("synth://nowhere?camera=0", "rig of the address"),
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn every_flaw_is_a_key() {
+    fn every_flaw_has_a_key() {
         for name in Flaws::NAMES {
             assert!(Address::KEYS.contains(&name));
         }

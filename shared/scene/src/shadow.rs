@@ -128,7 +128,7 @@ mod tests {
     use crate::random::Random;
 
     #[test]
-    fn a_plate_shades_what_is_behind_it_only() {
+    fn a_plate_casts_a_shadow_only_behind_it() {
         let light = Light::new(Random::new(1));
         let to = light.to_key;
         let side = to.cross(&Vector3::x()).try_normalize(1e-6).unwrap();

@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_number_gives_the_same_person_and_another_number_another() {
+    fn the_subject_number_determines_the_person() {
         assert_eq!(Subject::new(3), Subject::new(3));
         for number in 0..50 {
             assert_ne!(Subject::new(number), Subject::new(number + 1));

@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn every_joint_of_every_set_is_made_of_the_fourteen() {
+    fn every_joint_of_every_set_is_computed_from_the_fourteen_joints() {
         let known: Vec<usize> =
             PARSE14.joints.iter().flat_map(|joint| joint.parts).copied().collect();
         for set in JointSet::ALL {
@@ -307,7 +307,7 @@ mod tests {
         }
 
         #[test]
-        fn a_changed_line_is_read_or_refused(at in 0_usize..900, to in "[a-z0-9\\[\\]{},:.\"-]{0,4}") {
+        fn a_changed_line_is_parsed_or_refused(at in 0_usize..900, to in "[a-z0-9\\[\\]{},:.\"-]{0,4}") {
             let mut line = frame().to_line().unwrap();
             if at < line.len() {
                 line.replace_range(at..(at + 2).min(line.len()), &to);

@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn mirroring_exchanges_left_and_right_in_the_names() {
+    fn mirroring_swaps_left_and_right_in_the_names() {
         for part in 0..N_PARTS {
             let exchanged = PART_NAMES[part]
                 .replace("right", "RIGHT")

@@ -5,7 +5,7 @@ use scene::{Action, Scene, Settings};
 use skeleton::body::{Joints, check, deviation, refine};
 
 #[test]
-fn synthetic_people_are_people_whatever_they_do() {
+fn synthetic_people_are_accepted_in_every_action() {
     let mut worst = [0.0_f64; 3];
     for subject in 1..=50 {
         for action in [

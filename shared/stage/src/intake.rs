@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_stage_skips_frames_only_where_frames_may_be_lost() {
+    fn a_slow_stage_skips_frames_only_if_loss_is_allowed() {
         for (delivery, expected) in [(Delivery::Realtime, false), (Delivery::Lossless, true)] {
             let mut intake = intake(delivery);
             for nth in [0, 2, 4, 6] {

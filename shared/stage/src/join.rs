@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_input_is_down_until_it_sends_again() {
+    fn no_frame_waits_for_a_silent_input_until_it_sends_again() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 10);
         assert_eq!(frames(&mut joiner, 109), []);
@@ -381,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn no_frame_waits_for_what_a_restarted_sender_has_forgotten() {
+    fn no_frame_waits_for_messages_lost_by_a_restarted_sender() {
         let mut joiner = Joiner::lossless(2, 100 * TAKEN_UP_NANOS);
         joiner.push(0, 0, (), 10);
         joiner.push(0, 1, (), 20);
@@ -418,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_over_when_all_inputs_have_ended_and_all_frames_are_returned() {
+    fn the_join_is_finished_when_all_inputs_have_ended_and_all_frames_are_returned() {
         let mut joiner = Joiner::new(2, 100);
         joiner.push(0, 0, (), 0);
         joiner.end(0);
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_not_over_before_an_input_has_ended() {
+    fn the_join_is_not_finished_before_an_input_has_ended() {
         let mut joiner: Joiner<()> = Joiner::new(2, 100);
         assert!(!joiner.is_over(u64::MAX));
         joiner.push(0, 0, (), 0);

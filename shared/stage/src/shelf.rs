@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_frames_of_every_stride_are_kept_longest() {
+    fn frames_on_larger_strides_are_kept_longest() {
         assert_eq!(least_needed(&[4, 5, 6]), 1);
         assert_eq!(least_needed(&[4, 6, 8]), 1);
         assert_eq!(least_needed(&[3, 4, 5]), 0, "the oldest of odd ones");
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn with_capacity_1_a_sample_is_received_when_the_previous_one_is_released() {
+    fn with_capacity_one_a_sample_is_received_after_the_previous_one_is_released() {
         let mut shelf = Shelf::new(1, 1);
         let mut receive = topic(0..5);
         shelf.fill(&mut receive).unwrap();
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn with_more_capacity_all_are_received_and_the_most_likely_needed_kept() {
+    fn with_more_capacity_all_samples_are_received_and_the_most_likely_needed_are_kept() {
         let mut shelf = Shelf::new(4, 1);
         shelf.fill(topic(0..7)).unwrap();
         let held: Vec<u64> = (0..7).filter(|frame| shelf.of(*frame).is_some()).collect();
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_number_far_ahead_is_released() {
+    fn a_sample_with_a_frame_number_far_ahead_is_released() {
         let mut shelf = Shelf::new(1, 2);
         shelf.fill(topic([u64::MAX])).unwrap();
         shelf.advance(4, topic([4 + 2 * MAX_AHEAD + 2, 4])).unwrap();

@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_interpolated_median_of_an_even_sample_lies_between_its_middles() {
+    fn the_interpolated_median_of_an_even_sample_lies_between_its_two_middle_values() {
         let sample = Sorted::new([4.0, 1.0, 3.0, 2.0]);
         assert_eq!(sample.interpolated(0.5), Some(2.5));
     }
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn all_medians_of_an_odd_sample_are_its_middle() {
+    fn all_kinds_of_median_of_an_odd_sample_are_its_middle_value() {
         let sample = Sorted::new([3.0_f32, 1.0, 2.0]);
         let medians = [
             sample.median(),
@@ -172,7 +172,7 @@ mod tests {
         }
 
         #[test]
-        fn interpolation_stays_between_the_extremes_and_never_falls(
+        fn interpolation_stays_between_the_extremes_and_is_monotonic(
             values in prop::collection::vec(-1e3..1e3_f64, 1..40), share in 0.0..1.0,
         ) {
             let sample = Sorted::new(values);

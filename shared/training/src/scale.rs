@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn no_people_and_people_at_one_point_have_no_size() {
+    fn empty_sets_and_people_at_a_single_point_have_no_size() {
         assert!(box_sides(&[], &PARENTS).is_empty());
         let side = box_sides(&[vec![[3.0, 3.0]; 4]], &PARENTS)[0];
         assert_eq!(side, 0.0);

@@ -234,7 +234,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn products_and_differences_are_those_of_dense_vectors(a in vector(), b in vector()) {
+        fn products_and_differences_equal_those_of_dense_vectors(a in vector(), b in vector()) {
             let (da, db) = (dense(&a), dense(&b));
             let single: Vec<f32> = db.iter().map(|db| *db as f32).collect();
             prop_assert_eq!(a.dot(&single), product(&da, &db));

@@ -184,7 +184,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_balanced_model_scores_a_mirrored_pose_as_the_pose(
+        fn a_balanced_model_gives_a_pose_and_its_mirror_image_the_same_score(
             places in prop::collection::vec((0..7_u16, 0..6_u16, 0..6_u8), 4),
             seed in any::<u64>(),
         ) {
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shape_whose_sides_differ_has_no_symmetry() {
+    fn a_tree_with_different_sides_has_no_symmetry() {
         let mut other = shape();
         other.anchors[3][0] = [3, 1];
         assert_eq!(Symmetry::of(&other), None);

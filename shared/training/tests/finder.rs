@@ -83,7 +83,7 @@ fn trainer<'a>(
 }
 
 #[test]
-fn it_learns_to_find_boxes_and_nobody_where_nobody_is() {
+fn a_trained_detector_finds_people_and_nothing_in_empty_pictures() {
     let (learnt, kept) = (pictures(24, 1), pictures(16, 2));
     let settings = small();
     let mut trainer = trainer(&settings, [&learnt, &kept], None);
@@ -108,7 +108,7 @@ fn it_learns_to_find_boxes_and_nobody_where_nobody_is() {
 }
 
 #[test]
-fn a_training_that_was_interrupted_ends_with_the_same_bits() {
+fn an_interrupted_training_ends_bit_for_bit_the_same() {
     let pictures = pictures(8, 3);
     let settings = small();
     let shown = [&pictures[..6], &pictures[6..]];
@@ -122,7 +122,7 @@ fn a_training_that_was_interrupted_ends_with_the_same_bits() {
 }
 
 #[test]
-fn the_file_that_is_written_finds_what_the_trained_network_found() {
+fn the_written_file_gives_the_results_of_the_trained_network() {
     let pictures = pictures(8, 4);
     let settings = small();
     let mut trainer = trainer(&settings, [&pictures[..6], &pictures[6..]], None);
@@ -152,7 +152,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
 }
 
 #[test]
-fn the_network_that_ships_is_cheap_and_its_card_is_one() {
+fn the_included_detector_is_small_and_its_card_is_valid() {
     let shape = Shape::default();
     let parameters = training::networks::finder::initial(&shape, 1);
     let n: usize = parameters.iter().map(|list| list.values.len()).sum();
@@ -166,7 +166,7 @@ proptest! {
 
     /// For any variation, the card's codec decodes the true output to the boxes in the sample.
     #[test]
-    fn what_should_be_found_is_decoded_as_the_boxes_that_were_shown(seed in any::<u64>()) {
+    fn training_targets_decode_to_the_annotated_boxes(seed in any::<u64>()) {
         let settings = small();
         let pictures = pictures(4, seed);
         let mut rng = fastrand::Rng::with_seed(seed);

@@ -103,7 +103,7 @@ const fn steps(steps: usize) -> Plan {
 }
 
 #[test]
-fn it_learns_and_a_training_that_was_interrupted_ends_with_the_same_bits() {
+fn training_reduces_the_cost_and_an_interrupted_training_ends_bit_for_bit_the_same() {
     let (learnt, kept) = (people(10, 1), people(3, 2));
     let settings = small();
     let new = |checkpoint: Option<&[u8]>| trainer(&settings, [&learnt, &kept], checkpoint);
@@ -180,7 +180,7 @@ fn both_backends_learn_the_same() {
 }
 
 #[test]
-fn what_is_shown_lies_where_the_heat_is() {
+fn training_maps_have_their_maxima_at_the_joints() {
     let person = &people(1, 3)[0];
     let shape = small().shape;
     let sample = plain(person, &shape).unwrap();
@@ -196,7 +196,7 @@ fn what_is_shown_lies_where_the_heat_is() {
 }
 
 #[test]
-fn the_file_that_is_written_finds_what_the_trained_network_found() {
+fn the_written_file_gives_the_results_of_the_trained_network() {
     let people = people(6, 4);
     let settings = small();
     let mut trainer = trainer(&settings, [&people[..5], &people[5..]], None);
@@ -221,7 +221,7 @@ fn the_file_that_is_written_finds_what_the_trained_network_found() {
 }
 
 #[test]
-fn a_checkpoint_that_was_changed_or_is_of_another_training_is_refused() {
+fn a_changed_checkpoint_and_one_of_another_training_are_refused() {
     let people = people(4, 5);
     let settings = small();
     let shown = [&people[..3], &people[3..]];
@@ -251,7 +251,7 @@ fn a_checkpoint_that_was_changed_or_is_of_another_training_is_refused() {
 }
 
 #[test]
-fn a_training_goes_on_from_a_network_that_was_written() {
+fn training_continues_from_a_written_network() {
     let people = people(6, 4);
     let settings = small();
     let shown = [&people[..5], &people[5..]];
@@ -276,7 +276,7 @@ fn a_training_goes_on_from_a_network_that_was_written() {
 }
 
 #[test]
-fn a_file_that_is_not_such_a_network_is_refused_with_what_it_lacks() {
+fn a_file_of_another_network_is_refused_with_the_missing_layers() {
     let settings = small();
     let parameters = training::networks::pose::initial(&settings.shape, 1);
     let file = training::networks::pose::file(&settings.shape, &parameters, &[]);
@@ -313,7 +313,7 @@ fn a_file_that_is_not_such_a_network_is_refused_with_what_it_lacks() {
 }
 
 #[test]
-fn numbers_that_only_another_backend_has_are_refused() {
+fn precisions_of_another_backend_are_refused() {
     let people = people(2, 5);
     let settings = Settings {
         precision: Precision::Bf16,
@@ -345,7 +345,7 @@ fn found_by(file: Vec<u8>, shape: &Shape, picture: &[f32]) -> Vec<Vec<f32>> {
 }
 
 #[test]
-fn extra_keypoints_are_learned_alone_and_everything_else_keeps_its_bits() {
+fn training_extra_keypoints_alone_leaves_all_other_weights_unchanged() {
     let people = people(10, 6);
     let shown = [&people[..8], &people[8..]];
     let settings = small();

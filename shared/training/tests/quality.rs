@@ -197,7 +197,7 @@ fn groups_are_not_split_and_a_single_group_is_refused() {
 }
 
 #[test]
-fn weights_of_no_layer_are_refused_and_frozen_ones_do_not_change() {
+fn weights_of_unknown_layers_are_refused_and_frozen_weights_do_not_change() {
     let samples = samples(Kind::Vgg16, 21);
     let settings = Settings {
         epochs: 1,

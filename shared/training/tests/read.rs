@@ -78,7 +78,7 @@ fn messages(problems: &People) -> Vec<String> {
 }
 
 #[test]
-fn the_layout_of_parse_is_read_with_pixels_from_0() {
+fn the_parse_layout_is_converted_to_pixels_counted_from_0() {
     let dir = parse_set();
     let people = read(dir.path(), &ReadOptions::default()).unwrap();
     assert!(people.problems.is_empty(), "{:?}", people.problems);
@@ -96,7 +96,7 @@ fn the_layout_of_parse_is_read_with_pixels_from_0() {
 }
 
 #[test]
-fn an_array_of_two_sizes_is_one_person() {
+fn an_array_with_two_dimensions_is_one_person() {
     let Mat::Numbers(_, values) = labels(1) else {
         unreachable!("numbers")
     };
@@ -106,7 +106,7 @@ fn an_array_of_two_sizes_is_one_person() {
 }
 
 #[test]
-fn the_third_number_is_hidden_in_lsp_and_visible_in_lsp_extended() {
+fn the_third_number_means_hidden_in_lsp_and_visible_in_lsp_extended() {
     const N: usize = 4;
     let flag = |joint: usize| f64::from(u8::from(joint == 1));
     let value = |i: usize, axis: usize, person: usize| match axis {
@@ -162,7 +162,7 @@ fn the_images_of_lsp_are_numbered_with_four_or_five_digits_or_listed() {
 }
 
 #[test]
-fn ranges_and_lists_select_and_leave_out() {
+fn ranges_and_lists_select_and_exclude_people() {
     let dir = parse_set();
     let list = dir.path().join("test.txt");
     fs::write(&list, "im0003.png\n").unwrap();
@@ -246,7 +246,7 @@ fn every_fault_is_reported_with_file_and_row_and_counted() {
 }
 
 #[test]
-fn the_caller_chooses_fatal_faults_and_the_margin() {
+fn the_caller_chooses_which_faults_are_fatal_and_the_margin() {
     let dir = faulty();
     let path = dir.path().join("people.jsonl");
     let fatal = |kinds: &[FaultKind]| {
@@ -344,7 +344,7 @@ fn other_files_are_refused() {
 
 proptest! {
     #[test]
-    fn a_data_set_is_the_same_when_written_as_lines(unknown in 0..12_usize) {
+    fn a_data_set_written_as_lines_reads_back_unchanged(unknown in 0..12_usize) {
         let dir = parse_set();
         let mut people = read(dir.path(), &ReadOptions::default()).unwrap().people;
         people[unknown / 3].joints[unknown % 3] = [f64::NAN; 2];

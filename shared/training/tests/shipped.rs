@@ -13,7 +13,7 @@ const EXPECTED: [f32; N_PARTS] = [
 ];
 
 #[test]
-fn the_shipped_network_has_its_card_and_matches_onnx_runtime() {
+fn the_included_network_fits_its_card_and_matches_onnx_runtime() {
     let network = Network::parse(FILE.to_vec(), N_PARTS).unwrap();
     assert!(network.takes_tile() && network.takes_evidence());
     assert_eq!(network.tile_shape(), TileShape::SMALL);

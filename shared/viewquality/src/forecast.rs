@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_are_those_of_the_original_image() {
+    fn positions_are_in_pixels_of_the_original_image() {
         let forecast = run(&mut constant(8.0, Unit::Pixels, 6.0), 0.5).unwrap();
         close(&forecast.sigma_px, 4.0);
         close(&forecast.tau_px, 3.0);

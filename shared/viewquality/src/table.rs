@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_the_authors_format() {
+    fn reads_the_format_of_the_authors() {
         let table = Table::parse(RELEASED, 2).unwrap();
         assert_eq!(table.get("S1", "Box", 6, "C1"), Some(&[8.5, 6.25][..]));
         assert_eq!(table.get("S1", "Box", 6, "C2"), Some(&[3.0, 4.0][..]));

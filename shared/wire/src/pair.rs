@@ -177,7 +177,7 @@ mod tests {
         }
 
         #[test]
-        fn any_message_is_refused_or_about_two_views_of_the_rig(
+        fn any_message_is_refused_or_names_two_views_of_the_rig(
             poses in prop::array::uniform2(pose_message()),
             views in prop::array::uniform2(prop_oneof![0_u32..3, any::<u32>()]),
             n_hypotheses in prop_oneof![0_u32..4, any::<u32>()],

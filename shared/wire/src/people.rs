@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_candidate_belongs_to_one_person_and_an_identity_too() {
+    fn a_candidate_belongs_to_one_person_and_ids_are_unique() {
         let good = people_to_message(&frame(), 0b101).unwrap();
         let refused = |change: fn(&mut People)| {
             let mut message = good;
@@ -146,7 +146,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_message_is_refused_or_about_candidates_that_views_can_have(
+        fn any_message_is_refused_or_names_possible_candidates(
             n_people in prop_oneof![0_u32..10, any::<u32>()],
             candidates in prop::array::uniform8(prop::array::uniform16(prop_oneof![Just(NO_CANDIDATE), any::<u8>(), 0_u8..9])),
         ) {

@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn no_prediction_is_not_a_prediction_of_zero() {
+    fn a_missing_prediction_differs_from_a_prediction_of_zero() {
         let message = sigma_to_message(None).unwrap();
         assert_eq!(message.status, Status::NO_PREDICTION);
         assert_eq!(sigma_from_message(&message, 26).unwrap(), None);

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_is_as_well_as_the_best_of_its_people() {
+    fn the_status_of_a_frame_is_the_best_status_of_its_people() {
         let found = skeleton();
         let mut lost = skeleton();
         lost.joints = lost.joints.split_off(1);
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn an_identity_is_of_one_person() {
+    fn an_id_belongs_to_one_person() {
         let skeleton = skeleton();
         let people = [4, 9, 4].map(|id| person(id, &skeleton));
         let mut got = skeletons_to_message(&people, 3, 0b11).unwrap();
@@ -420,7 +420,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn people_come_back_in_their_order(ids in prop::collection::hash_set(1_u64.., 0..=MAX_PEOPLE)) {
+        fn people_keep_their_order_in_a_round_trip(ids in prop::collection::hash_set(1_u64.., 0..=MAX_PEOPLE)) {
             let skeleton = skeleton();
             let people: Vec<_> = ids.iter().map(|id| person(*id, &skeleton)).collect();
             let got = skeletons_to_message(&people, ids.len(), 0b11).unwrap();

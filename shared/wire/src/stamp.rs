@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn results_of_pairs_of_another_worker_are_refused() {
+    fn results_of_pairs_that_belong_to_another_worker_are_refused() {
         for pair in [2, 5, 8] {
             let stamp = Stamp {
                 view: pair,

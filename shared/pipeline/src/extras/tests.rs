@@ -135,14 +135,14 @@ fn check(found: &[Result<Triangulated, NoJoint>]) {
 }
 
 #[test]
-fn what_all_views_see_lies_where_it_is() {
+fn a_keypoint_seen_by_all_views_is_triangulated_correctly() {
     let found = Scene::new().run();
     check(&found);
     assert!(found.iter().flatten().all(|joint| joint.views_used == 0b1111));
 }
 
 #[test]
-fn a_view_that_exchanges_the_legs_takes_part() {
+fn a_view_with_swapped_legs_is_used() {
     let mut scene = Scene::new();
     let person = &mut scene.seen[2][0];
     for [right, left] in [[0, 5], [1, 4], [2, 3]] {
@@ -155,7 +155,7 @@ fn a_view_that_exchanges_the_legs_takes_part() {
 }
 
 #[test]
-fn a_view_that_is_wrong_is_left_out() {
+fn a_wrong_view_is_left_out() {
     let mut scene = Scene::new();
     scene.seen[1][0].extras[2] = Some(([100.0, 500.0], SIGMA_PX));
     let found = scene.run();
@@ -164,7 +164,7 @@ fn a_view_that_is_wrong_is_left_out() {
 }
 
 #[test]
-fn the_candidate_that_is_the_person_counts() {
+fn only_the_candidate_of_the_person_is_used() {
     let mut scene = Scene::new();
     for view in 0..N_VIEWS {
         let by = [0.3, -1.2, 0.0];
@@ -180,7 +180,7 @@ fn the_candidate_that_is_the_person_counts() {
 }
 
 #[test]
-fn a_candidate_without_its_keypoints_is_no_other_one() {
+fn a_candidate_without_extra_keypoints_is_not_replaced_by_another() {
     let mut scene = Scene::new();
     // Nothing was stored for the person's extra keypoints, because there was no room.
     let by = [0.3, -1.2, 0.0];
@@ -193,7 +193,7 @@ fn a_candidate_without_its_keypoints_is_no_other_one() {
 }
 
 #[test]
-fn what_one_view_sees_has_no_place() {
+fn a_keypoint_seen_by_one_view_has_no_position() {
     let mut scene = Scene::new();
     for people in &mut scene.seen[1..] {
         people[0].extras[0] = None;
@@ -208,7 +208,7 @@ fn what_one_view_sees_has_no_place() {
 }
 
 #[test]
-fn what_is_far_from_every_joint_is_not_the_persons() {
+fn a_keypoint_far_from_every_joint_is_rejected() {
     let mut scene = Scene::new();
     for view in 0..N_VIEWS {
         let far = scene.project(view, [0.0, 0.9, 1.9], [0.0; 3]);
@@ -220,7 +220,7 @@ fn what_is_far_from_every_joint_is_not_the_persons() {
 }
 
 #[test]
-fn without_a_skeleton_there_is_nothing() {
+fn without_a_skeleton_there_are_no_extra_keypoints() {
     let mut scene = Scene::new();
     scene.skeleton.joints.clear();
     assert!(scene.run().iter().all(Result::is_err));

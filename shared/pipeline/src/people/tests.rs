@@ -69,7 +69,7 @@ fn cameras(n: usize) -> Vec<Camera> {
 }
 
 #[test]
-fn three_people_are_found_where_they_stand_the_clearest_first() {
+fn three_people_are_found_in_the_right_places_sorted_by_clarity() {
     let cameras = cameras(4);
     let people = [([-1.0, 0.4], 0.6), ([0.9, 0.8], 1.0), ([0.2, -1.1], 0.8)];
     let found = found(&cameras, &people).people;
@@ -84,7 +84,7 @@ fn three_people_are_found_where_they_stand_the_clearest_first() {
 }
 
 #[test]
-fn what_only_two_of_four_views_see_is_nobody_but_of_two_views_it_is() {
+fn a_person_seen_by_two_views_is_accepted_with_two_cameras_and_not_with_four() {
     let people = [([0.0, 0.0], 1.0), ([0.3, 1.4], 1.0)];
     let four = cameras(4);
     let mut views = seen(&four, &people);
@@ -96,21 +96,21 @@ fn what_only_two_of_four_views_see_is_nobody_but_of_two_views_it_is() {
 }
 
 #[test]
-fn somebody_much_less_clear_than_the_first_is_nobody() {
+fn a_person_much_less_clear_than_the_first_is_rejected() {
     let people = |strength| found(&cameras(4), &[([0.0, 0.0], 1.0), ([1.0, 0.5], strength)]).people;
     assert_eq!(people(MIN_STRENGTH + 0.01).len(), 2);
     assert_eq!(people(MIN_STRENGTH - 0.01).len(), 1);
 }
 
 #[test]
-fn a_second_candidate_on_the_same_person_is_no_second_person() {
+fn a_second_candidate_of_the_same_person_is_not_a_second_person() {
     let cameras = cameras(4);
     let people = [([0.0, 0.0], 1.0), ([0.08, 0.05], 0.9)];
     assert_eq!(found(&cameras, &people).people.len(), 1);
 }
 
 #[test]
-fn something_that_is_no_body_in_space_is_nobody() {
+fn joints_that_do_not_form_a_body_are_rejected() {
     let cameras = cameras(4);
     let doll = |camera: &Camera| {
         let mut it = sighting(camera, [0.0, 0.0], 1.0);
@@ -124,7 +124,7 @@ fn something_that_is_no_body_in_space_is_nobody() {
 }
 
 #[test]
-fn the_others_of_a_view_are_left_out_but_never_all() {
+fn poor_views_are_left_out_but_never_all_of_them() {
     let cameras = cameras(3);
     let mut found = found(&cameras, &[([0.0, 0.0], 1.0), ([1.2, 0.5], 0.8)]);
     // In view v, person p is candidate (p - v) mod 2.
@@ -139,7 +139,7 @@ fn the_others_of_a_view_are_left_out_but_never_all() {
 }
 
 #[test]
-fn views_without_candidates_or_with_points_that_are_no_numbers_find_nobody() {
+fn views_without_candidates_or_with_invalid_points_give_no_people() {
     let cameras = cameras(3);
     assert_eq!(found(&cameras, &[]).people, []);
     let mut views = seen(&cameras, &[([0.0, 0.0], 1.0)]);
@@ -152,7 +152,7 @@ fn views_without_candidates_or_with_points_that_are_no_numbers_find_nobody() {
 
 proptest! {
     #[test]
-    fn people_stand_apart_and_their_candidates_exist(
+    fn people_do_not_overlap_and_their_candidates_exist(
         people in proptest::collection::vec(([-1.5..1.5_f64, -1.5..1.5], 0.1..1.0_f64), 0..5),
     ) {
         let cameras = cameras(4);

@@ -76,7 +76,7 @@ fn ids(frame: &FramePeople) -> Vec<u64> {
 }
 
 #[test]
-fn everybody_is_told_with_the_candidate_of_every_view() {
+fn everybody_is_reported_with_their_candidate_in_every_view() {
     let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
     let frames = run(Follow::Last, &[both; 4]);
     for frame in &frames {
@@ -96,7 +96,7 @@ fn everybody_is_told_with_the_candidate_of_every_view() {
 }
 
 #[test]
-fn who_is_followed_stays_first_and_keeps_the_identity_through_a_second_without_sight() {
+fn the_followed_person_stays_first_and_keeps_the_id_through_a_gap_of_a_second() {
     let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
     let other: &[([f64; 2], f32)] = &[([0.9, 0.4], 0.95)];
     let frames = [vec![both; 5], vec![other; 10], vec![both; 5]].concat();
@@ -112,7 +112,7 @@ fn who_is_followed_stays_first_and_keeps_the_identity_through_a_second_without_s
 }
 
 #[test]
-fn somebody_else_is_followed_once_the_person_is_gone() {
+fn another_person_is_followed_after_the_person_has_left() {
     let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
     let other: &[([f64; 2], f32)] = &[([0.9, 0.4], 0.7)];
     let frames = [vec![both; 5], vec![other; 45]].concat();
@@ -122,7 +122,7 @@ fn somebody_else_is_followed_once_the_person_is_gone() {
 }
 
 #[test]
-fn nobody_and_one_view_are_nobody() {
+fn no_candidates_or_a_single_view_give_no_people() {
     let mut step = WhoStep::new((0..N_VIEWS).map(camera).collect(), WhoSettings::default());
     assert_eq!(
         step.run(0.0, &[None, None, None, None]),
@@ -134,7 +134,7 @@ fn nobody_and_one_view_are_nobody() {
 }
 
 #[test]
-fn a_restarted_process_gives_no_identity_again() {
+fn a_restarted_process_never_reuses_an_id() {
     let settings = WhoSettings {
         n_restarts: 2,
         ..WhoSettings::default()
@@ -145,7 +145,7 @@ fn a_restarted_process_gives_no_identity_again() {
 }
 
 #[test]
-fn a_step_that_goes_on_where_another_ended_knows_the_people_and_who_is_followed() {
+fn a_restored_step_knows_the_people_and_the_followed_person() {
     let cameras = || (0..N_VIEWS).map(camera).collect();
     let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.7), ([0.9, 0.4], 0.9)];
     let mut first = WhoStep::new(cameras(), WhoSettings::default());

@@ -36,7 +36,7 @@ fn digits(skeletons: &[Skeleton]) -> Vec<String> {
 }
 
 #[test]
-fn with_equal_capture_times_the_result_is_the_same_to_the_bit() {
+fn with_equal_capture_times_the_result_is_bit_for_bit_the_same() {
     let scene = Scene::new(48, 3);
     let before = skeletons(&scene, false, [0.0; 3]);
     assert!(before.iter().all(|skeleton| skeleton.joints.iter().any(Result::is_ok)));
@@ -46,7 +46,7 @@ fn with_equal_capture_times_the_result_is_the_same_to_the_bit() {
 }
 
 #[test]
-fn with_other_capture_times_joints_are_moved_and_the_poses_of_the_views_are_not() {
+fn with_different_capture_times_3d_joints_are_moved_and_poses_of_views_are_not() {
     let scene = Scene::new(48, 3);
     let equal = skeletons(&scene, true, [0.0; 3]);
     let skewed = skeletons(&scene, true, [0.0, 0.01, -0.01]);

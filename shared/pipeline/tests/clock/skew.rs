@@ -107,7 +107,7 @@ fn measured(rig: &str, action: Action, skews_ms: &[f64]) -> [f64; 5] {
 }
 
 #[test]
-fn of_a_running_person_skews_of_up_to_half_a_period_cost_at_most_a_tenth() {
+fn for_a_runner_skews_of_half_a_period_increase_the_error_by_at_most_a_tenth() {
     for (rig, skews_ms) in [
         ("ring:4", &[0.0, 5.0, 11.0, 16.0][..]),
         ("ring:4", &[0.0, -16.0, 8.0, 16.0]),
@@ -123,13 +123,13 @@ fn of_a_running_person_skews_of_up_to_half_a_period_cost_at_most_a_tenth() {
 }
 
 #[test]
-fn of_a_person_who_stands_and_boxes_skews_cost_nothing_worth_mentioning() {
+fn for_a_boxing_person_skews_hardly_increase_the_error() {
     let [without, _, _, _, both] = measured("ring:4", Action::Boxing, &[0.0, -16.0, 8.0, 16.0]);
     assert!(both < 1.05 * without, "{both} {without}");
 }
 
 #[test]
-fn the_worst_skews_of_all_are_still_better_moved_than_not() {
+fn even_the_largest_skews_are_better_corrected_than_not() {
     let skews_ms = [-16.6, 16.6, -16.6, 16.6];
     let [without, nothing, _, moved, both] = measured("ring:4", Action::Jogging, &skews_ms);
     assert!(both < 0.6 * nothing && both < 1.25 * without);

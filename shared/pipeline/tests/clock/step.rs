@@ -40,7 +40,7 @@ fn steps(watch: &StepWatch, n: usize) -> Vec<Option<Step>> {
 }
 
 #[test]
-fn planted_offsets_are_found_and_named() {
+fn simulated_offsets_are_found_and_named() {
     for (rig, n) in [("ring:4", 4), ("humaneva", 3)] {
         let mut film = Film::new(rig, Action::Walking, 1);
         let cameras = film.cameras().to_vec();
@@ -61,7 +61,7 @@ fn planted_offsets_are_found_and_named() {
 }
 
 #[test]
-fn nothing_is_found_where_all_are_in_step() {
+fn synchronised_cameras_give_no_offset() {
     let mut worst: f64 = 0.0;
     for action in [Action::Walking, Action::Boxing] {
         let mut film = Film::new("ring:4", action, 2);
@@ -87,7 +87,7 @@ fn nothing_is_found_where_all_are_in_step() {
 }
 
 #[test]
-fn nothing_is_said_of_a_person_who_does_not_move() {
+fn a_still_person_gives_no_offset() {
     let mut film = Film::new("ring:4", Action::Lying, 1);
     let cameras = film.cameras().to_vec();
     let mut watch = StepWatch::new(cameras.clone());
@@ -106,7 +106,7 @@ fn nothing_is_said_of_a_person_who_does_not_move() {
 }
 
 #[test]
-fn a_camera_that_was_moved_is_not_out_of_step() {
+fn a_moved_camera_is_not_reported_as_unsynchronised() {
     let mut film = Film::new("ring:4", Action::Walking, 2);
     let mut calibrated = film.cameras().to_vec();
     let turn = Isometry3::rotation(Vector3::new(0.01, 0.03, 0.0));
@@ -125,7 +125,7 @@ fn a_camera_that_was_moved_is_not_out_of_step() {
 }
 
 #[test]
-fn a_late_camera_may_look_moved_and_is_then_known_to_be_late() {
+fn a_late_camera_that_looks_moved_is_reported_as_late() {
     let mut film = Film::new("ring:4", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
     let mut moved = RigWatch::new(cameras.clone());
@@ -148,7 +148,7 @@ fn a_late_camera_may_look_moved_and_is_then_known_to_be_late() {
 }
 
 #[test]
-fn a_camera_that_drifts_is_named_once_it_is_out_of_step() {
+fn a_drifting_camera_is_named_once_its_offset_is_large() {
     let mut film = Film::new("ring:4", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
     // A drift of 1 ms per second: thirty times the drift of real clocks.
@@ -167,7 +167,7 @@ fn a_camera_that_drifts_is_named_once_it_is_out_of_step() {
 }
 
 #[test]
-fn of_two_cameras_both_are_off_by_half() {
+fn with_two_cameras_each_gets_half_of_the_offset() {
     let mut film = Film::new("ring:2", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
     let late = |view: usize, _: u32| if view == 0 { 30.0 } else { 0.0 };
@@ -180,7 +180,7 @@ fn of_two_cameras_both_are_off_by_half() {
 }
 
 #[test]
-fn what_is_missing_or_no_number_is_left_out() {
+fn missing_and_invalid_values_are_left_out() {
     let mut film = Film::new("ring:2", Action::Walking, 1);
     let cameras = film.cameras().to_vec();
     let mut watch = StepWatch::new(cameras);

@@ -57,7 +57,7 @@ fn off(a: &[f32], b: &[f32]) -> f64 {
 }
 
 #[test]
-fn a_gaussian_comes_back_as_it_was() {
+fn a_gaussian_is_recovered_exactly() {
     for given in [
         bump(0, [40.3, 50.8], 0.9, [2.0, 2.0], 0.0),
         bump(13, [30.0, 41.5], 0.2, [1.2, 3.5], 0.6),
@@ -81,7 +81,7 @@ fn a_gaussian_comes_back_as_it_was() {
 }
 
 #[test]
-fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
+fn two_maxima_and_a_ridge_are_recovered_within_a_few_hundredths() {
     let mut given = vec![
         bump(3, [35.0, 50.0], 0.8, [2.0, 2.0], 0.0),
         bump(3, [38.5, 52.0], 0.6, [1.5, 1.5], 0.0),
@@ -108,7 +108,7 @@ fn two_people_and_a_ridge_come_back_to_a_few_hundredths() {
 }
 
 #[test]
-fn nothing_is_the_floor() {
+fn an_empty_map_gives_the_floor_value() {
     let values = filled(&[]);
     assert!(values.iter().all(|value| *value == SETTINGS.floor()));
     assert_eq!(bumps(&maps(&values), &SETTINGS), []);
@@ -126,7 +126,7 @@ fn a_gaussian_at_the_edge_or_beyond_it_stays_within_the_window() {
 }
 
 #[test]
-fn what_is_no_gaussian_is_not_sound() {
+fn an_invalid_gaussian_is_rejected() {
     let good = bump(1, [10.0, 15.0], 0.9, [2.0, 2.0], 0.3);
     assert!(good.is_sound());
     for bad in [

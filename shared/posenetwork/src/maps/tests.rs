@@ -38,7 +38,7 @@ const NECK: usize = 12;
 const NECK_25: usize = 1;
 
 #[test]
-fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
+fn the_map_of_a_joint_has_its_maximum_at_the_keypoint_with_the_value_of_the_score() {
     let keypoints = person();
     let maps = maps(&keypoints);
     assert_eq!(PARSE14.joints[NECK].name, "neck");
@@ -58,7 +58,7 @@ fn a_joint_is_highest_where_its_keypoint_lies_and_as_high_as_its_score() {
 }
 
 #[test]
-fn a_keypoint_that_is_no_joint_is_told_with_its_deviation() {
+fn an_extra_keypoint_is_returned_with_its_deviation() {
     let mut keypoints = person();
     let heel = BODY_25.iter().position(|name| *name == "left heel").unwrap();
     let mut maps = maps(&keypoints);
@@ -76,7 +76,7 @@ fn a_keypoint_that_is_no_joint_is_told_with_its_deviation() {
 }
 
 #[test]
-fn far_from_a_joint_and_beyond_the_box_is_the_floor() {
+fn a_map_has_the_floor_value_far_from_the_joint_and_outside_the_box() {
     let maps = maps(&person());
     assert_eq!(maps.floor(), 0.02_f32.ln());
     for point in [[300.0, 450.0], [300.0, -500.0], [f64::NAN, 0.0]] {
@@ -86,7 +86,7 @@ fn far_from_a_joint_and_beyond_the_box_is_the_floor() {
 }
 
 #[test]
-fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
+fn joints_of_a_keypoint_that_was_not_found_are_missing() {
     for lost in [None, Some(NOWHERE)] {
         let mut keypoints = person();
         keypoints[NECK_25] = lost;
@@ -101,7 +101,7 @@ fn a_keypoint_that_was_not_found_takes_its_joints_with_it() {
 }
 
 #[test]
-fn a_head_by_one_ear_is_there_and_says_that_it_is_less_sure() {
+fn a_head_estimated_from_one_ear_has_a_larger_deviation() {
     let mut keypoints = person();
     let all = maps(&keypoints);
     // In a profile, both eyes and the left ear are not seen.
@@ -138,7 +138,7 @@ fn a_derived_joint_has_the_lowest_score_of_its_keypoints() {
 }
 
 #[test]
-fn nobody_leaves_the_floor_and_nothing_of_an_earlier_frame() {
+fn without_keypoints_the_maps_have_the_floor_value_and_no_trace_of_earlier_frames() {
     let mut maps = maps(&person());
     for keypoints in [vec![None; 25], vec![Some(NOWHERE); 25]] {
         let is_there = maps.of_keypoints(&keypoints, &ways(&BODY_25), &SETTINGS, 0.02);
@@ -152,7 +152,7 @@ fn nobody_leaves_the_floor_and_nothing_of_an_earlier_frame() {
 }
 
 #[test]
-fn a_small_or_strange_box_has_maps_too() {
+fn small_and_unusual_boxes_also_give_maps() {
     let one = |at: [f64; 2]| {
         let mut keypoints = vec![None; 25];
         keypoints[NECK_25] = Some(Keypoint { at, score: 1.0 });
@@ -172,7 +172,7 @@ fn a_small_or_strange_box_has_maps_too() {
 }
 
 #[test]
-fn frames_after_the_first_need_no_further_memory() {
+fn frames_after_the_first_do_not_allocate_memory() {
     let mut maps = maps(&person());
     let before = [maps.values.capacity(), maps.peaks.capacity()];
     // The widest possible grid.
@@ -188,7 +188,7 @@ fn frames_after_the_first_need_no_further_memory() {
 }
 
 #[test]
-fn what_moves_in_the_picture_moves_its_maps() {
+fn shifting_the_maps_moves_their_values() {
     let mut maps = maps(&person());
     let before = maps.at(NECK, [262.0, 118.0]);
     maps.shift([100.0, -30.0]);

@@ -38,7 +38,7 @@ fn pooled() -> Network {
 }
 
 #[test]
-fn a_network_that_treats_both_sides_alike_sees_the_same() {
+fn a_symmetric_network_gives_the_same_result_for_the_mirror_image() {
     let [plain, mirrored] = both(&network("Relu"), CARD);
     assert_eq!(plain, mirrored);
     let centred = CARD.replace("refine", "centred = true\nrefine");
@@ -47,14 +47,14 @@ fn a_network_that_treats_both_sides_alike_sees_the_same() {
 }
 
 #[test]
-fn columns_of_bins_are_mirrored_and_rows_are_not() {
+fn bins_of_columns_are_mirrored_and_bins_of_rows_are_not() {
     let (net, simcc) = distributions();
     let [plain, mirrored] = both(&net, &simcc);
     assert_eq!(plain, mirrored);
 }
 
 #[test]
-fn left_and_right_are_the_mean_of_both() {
+fn left_and_right_maps_are_averaged_with_the_mirror_image() {
     let card = CARD.replace(
         "[\"a\", \"b\", \"c\"]",
         "[\"left hip\", \"right hip\", \"c\"]",
@@ -69,7 +69,7 @@ fn left_and_right_are_the_mean_of_both() {
 }
 
 #[test]
-fn towards_the_right_is_towards_the_left_in_a_mirror() {
+fn directions_to_the_right_become_directions_to_the_left_in_the_mirror_image() {
     let mut net = network("Relu");
     net.outputs.push(("front".to_owned(), sides(&[1, 2])));
     net.floats("constant", &[1, 2], vec![0.5, 1.5]);
@@ -88,7 +88,7 @@ fn towards_the_right_is_towards_the_left_in_a_mirror() {
 }
 
 #[test]
-fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
+fn cells_anchored_at_their_first_pixel_are_shifted_by_one_in_the_mirror_image() {
     let [plain, mirrored] = both(&pooled(), CARD);
     // The first column has no counterpart and stays as it is. The second column is averaged with the third of the mirror image, which is
     // the first of the picture.
@@ -104,7 +104,7 @@ fn cells_on_the_first_of_their_pixels_are_moved_by_one() {
 }
 
 #[test]
-fn a_network_that_cannot_is_refused() {
+fn a_network_without_left_and_right_pairs_is_refused() {
     let lonely = CARD.replace("\"a\"", "\"left hip\"");
     let refused = fitted(&network("Relu"), &lonely).unwrap().mirrored();
     assert_eq!(

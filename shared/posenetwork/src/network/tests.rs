@@ -79,7 +79,7 @@ fn an_input_of_another_name_or_other_sides_is_refused() {
 }
 
 #[test]
-fn of_several_inputs_or_outputs_the_card_names_one() {
+fn the_card_selects_one_of_several_inputs_or_outputs() {
     let mut net = network("Relu");
     net.inputs.push(("more".to_owned(), sides(&[1])));
     let said = refused(&net, CARD);
@@ -100,7 +100,7 @@ fn of_several_inputs_or_outputs_the_card_names_one() {
 }
 
 #[test]
-fn an_output_that_is_not_there_is_refused() {
+fn a_missing_output_is_refused() {
     let named = CARD.replace("refine", "maps = \"heat\"\nrefine");
     assert_eq!(
         refused(&network("Relu"), &named),
@@ -109,7 +109,7 @@ fn an_output_that_is_not_there_is_refused() {
 }
 
 #[test]
-fn another_number_of_maps_or_of_values_is_refused() {
+fn a_wrong_number_of_maps_or_values_is_refused() {
     let two = CARD.replace(", \"c\"", "");
     assert_eq!(
         refused(&network("Relu"), &two),
@@ -126,7 +126,7 @@ fn another_number_of_maps_or_of_values_is_refused() {
 }
 
 #[test]
-fn values_that_are_no_numbers_are_refused_when_they_come() {
+fn values_that_are_not_finite_are_refused_at_run_time() {
     assert_eq!(
         refused(&network("Log"), CARD),
         "output `maps`: value 0 of the output is -inf, which is not finite"
@@ -157,7 +157,7 @@ fn values_that_are_no_numbers_are_refused_when_they_come() {
 }
 
 #[test]
-fn whole_numbers_as_output_are_refused() {
+fn integer_outputs_are_refused() {
     let mut net = network("Relu");
     net.nodes.clear();
     let keep = vec![("axis", Attribute::Int(1)), ("keepdims", Attribute::Int(1))];
@@ -202,7 +202,7 @@ fn columns_and_rows_are_read_from_two_outputs() {
 }
 
 #[test]
-fn a_cell_lies_on_the_first_of_its_pixels_or_in_their_middle() {
+fn a_cell_is_anchored_at_its_first_pixel_or_at_its_middle() {
     let mut net = network("Relu");
     net.nodes.clear();
     net.outputs[0].1 = sides(&[1, 3, 4, 3]);
@@ -230,7 +230,7 @@ fn a_cell_lies_on_the_first_of_its_pixels_or_in_their_middle() {
 }
 
 #[test]
-fn a_list_is_read_with_its_unit() {
+fn a_list_of_keypoints_is_read_with_its_unit() {
     let mut net = network("Relu");
     net.nodes.clear();
     net.outputs[0].1 = sides(&[1, 1, 3, 3]);
@@ -256,7 +256,7 @@ fn a_list_is_read_with_its_unit() {
 }
 
 #[test]
-fn a_network_of_bytes_is_taken_by_the_card_of_one_of_whole_numbers() {
+fn a_network_with_byte_input_fits_a_card_with_integer_input() {
     let mut net = network("Relu");
     net.nodes.clear();
     net.node(

@@ -200,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_head_points_upward_after_the_turn() {
+    fn the_head_points_upward_after_the_rotation() {
         for (turn, head) in [
             (Turn::Up, [3, 0]),
             (Turn::Right, [6, 2]),
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_stays_until_the_head_points_far_elsewhere() {
+    fn a_rotation_is_kept_until_the_head_points_far_away() {
         let most = 60f64.to_radians();
         let towards = |degrees: f64| [degrees.to_radians().sin(), -degrees.to_radians().cos()];
         for (now, degrees, next) in [

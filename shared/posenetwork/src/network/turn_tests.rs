@@ -24,7 +24,7 @@ fn found(net: &Network, card: &str, turn: Turn) -> Vec<Keypoint> {
 }
 
 #[test]
-fn whoever_does_not_care_sees_the_same_in_every_turn() {
+fn a_rotation_invariant_network_gives_the_same_in_every_rotation() {
     // The window has the proportions 12 x 16 or 16 x 12, and is enlarged to contain the box.
     let upright = found(&network("Relu"), CARD, Turn::Up);
     let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
@@ -36,7 +36,7 @@ fn whoever_does_not_care_sees_the_same_in_every_turn() {
 }
 
 #[test]
-fn distributions_over_columns_and_rows_are_turned_too() {
+fn distributions_over_columns_and_rows_are_rotated_too() {
     let (net, simcc) = distributions();
     let upright = found(&net, &simcc, Turn::Up);
     let place = |keypoint: &Keypoint| keypoint.at.map(|at| at.round() as i64);
@@ -48,7 +48,7 @@ fn distributions_over_columns_and_rows_are_turned_too() {
 }
 
 #[test]
-fn the_direction_turns_with_the_picture() {
+fn the_direction_rotates_with_the_picture() {
     let mut net = network("Relu");
     net.outputs.push(("front".to_owned(), sides(&[1, 2])));
     net.floats("constant", &[1, 2], vec![0.5, 1.5]);

@@ -9,7 +9,7 @@ use crate::{Bus, Delivery, DeploymentLock, Limits, Topic, TopicPlan, wait_for_de
 use failure::Stop;
 
 #[test]
-fn a_topic_is_told_apart_from_its_version() {
+fn the_name_of_a_topic_is_split_from_its_version() {
     assert_eq!(parts_of("frame/v1/0"), Some(("frame", "1", "0")));
     assert_eq!(parts_of("skeletons/v1"), Some(("skeletons", "1", "")));
     assert_eq!(parts_of("else"), None);
@@ -24,7 +24,7 @@ fn a_guest_can_be_moved_to_another_thread() {
 }
 
 #[test]
-fn what_does_not_run_is_told_with_what_runs() {
+fn the_error_for_a_deployment_that_does_not_run_lists_the_running_ones() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let namespace = Namespace::below("nobody", base.path()).unwrap();
     let error = Guest::open(&namespace).unwrap_err();
@@ -69,7 +69,7 @@ fn deployment(base: &Path) -> (DeploymentLock, Bus, Vec<Topic>) {
 }
 
 #[test]
-fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
+fn no_sender_waits_for_a_guest_and_arrays_that_it_holds_stay_valid() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let (_lock, bus, _topics) = deployment(base.path());
     let guest = Guest::open(bus.namespace()).unwrap();
@@ -97,7 +97,7 @@ fn no_sender_waits_for_a_guest_and_what_it_holds_stays() {
 }
 
 #[test]
-fn another_version_and_another_type_are_told_apart() {
+fn an_unsupported_version_and_a_wrong_type_give_different_errors() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let (lock, bus, topics) = deployment(base.path());
     let guest = Guest::open(bus.namespace()).unwrap();
@@ -118,7 +118,7 @@ fn another_version_and_another_type_are_told_apart() {
 }
 
 #[test]
-fn there_are_as_many_seats_as_guests_and_one_that_is_left_is_free() {
+fn the_number_of_guests_is_limited_and_a_freed_place_can_be_used_again() {
     let base = tempfile::Builder::new().prefix("px").tempdir().unwrap();
     let namespace = Namespace::below("full", base.path()).unwrap();
     fs::create_dir(namespace.root()).unwrap();

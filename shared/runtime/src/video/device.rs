@@ -211,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_camera_is_refused_with_the_reason() {
+    fn devices_that_are_not_cameras_are_refused_with_the_reason() {
         let absent = VideoDevice::open(Path::new("/dev/video4711")).unwrap_err();
         assert!(matches!(absent, VideoError::Open { .. }), "{absent}");
         let other = VideoDevice::open(Path::new("/dev/null")).unwrap_err();
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_of_the_kernel_end_at_the_zero() {
+    fn kernel_strings_end_at_the_first_zero_byte() {
         assert_eq!(text(b"uvcvideo\0\0\0x"), "uvcvideo");
         assert_eq!(text(b"full"), "full");
         assert_eq!(

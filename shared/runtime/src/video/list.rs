@@ -304,7 +304,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn controls_are_named_as_keys() {
+    fn camera_controls_have_names_that_are_valid_keys() {
         assert_eq!(as_key("Exposure Time, Absolute"), "exposure_time_absolute");
         assert_eq!(
             as_key("White Balance, Automatic"),
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn values_out_of_range_and_choices_that_are_not_there_are_not_accepted() {
+    fn control_values_out_of_range_and_unknown_menu_choices_are_refused() {
         let mut control = VideoControl {
             id: 1,
             name: "a".to_owned(),
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_size_is_the_one_asked_for_or_the_largest() {
+    fn the_nearest_size_is_the_requested_one_or_the_largest() {
         let size = |w, h| VideoSize {
             least: [w, h],
             most: [w, h],

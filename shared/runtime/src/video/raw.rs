@@ -313,7 +313,7 @@ mod tests {
 
     /// These numbers are those of `linux/videodev2.h` on 64-bit machines.
     #[test]
-    fn requests_have_the_numbers_of_the_kernel() {
+    fn ioctl_requests_have_the_codes_of_the_kernel() {
         assert_eq!(code::<Capability>(QUERYCAP), 0x8068_5600);
         assert_eq!(code::<FormatDescription>(ENUM_FMT), 0xc040_5602);
         assert_eq!(code::<Format>(G_FMT), 0xc0d0_5604);
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_device_refuses_every_request() {
+    fn a_regular_file_refuses_every_ioctl_request() {
         use std::os::fd::AsFd as _;
         let file = std::fs::File::open("/dev/null").unwrap();
         let refused = ask(file.as_fd(), QUERYCAP, &mut Capability::default());

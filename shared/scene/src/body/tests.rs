@@ -51,7 +51,7 @@ fn left_joints_are_on_the_left() {
 }
 
 #[test]
-fn heels_lie_behind_the_ankles_and_toes_before_them_towards_the_other_foot() {
+fn heels_are_behind_the_ankles_and_big_toes_in_front_on_the_inner_side() {
     let frames = bones().frames(&standing());
     let [nose, heels @ .., left_toe, right_toe] = bones().extras(&frames);
     let top = frames[HEAD] * Point3::from(bones().head_top);

@@ -43,7 +43,7 @@ mod tests {
 
     /// Tests a whole person through a lens with distortion.
     #[test]
-    fn the_z_buffer_agrees_with_ray_casting() {
+    fn the_depth_buffer_agrees_with_ray_casting() {
         let rig = rigs::humaneva().unwrap();
         let mut camera = rig.cameras()[0].clone();
         // The picture is much smaller, 64 x 48, so that every sample can be checked.

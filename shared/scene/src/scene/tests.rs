@@ -25,7 +25,7 @@ fn picture(view: &mut View, frame: u64) -> (Vec<u8>, ViewTruth) {
 }
 
 #[test]
-fn pixels_of_the_truth_are_projections_of_its_joints() {
+fn pixels_of_the_ground_truth_are_projections_of_its_joints() {
     for rig in ["humaneva", "umpm"] {
         let scene = scene(rig, Action::Walking, 2);
         for (nth, camera) in scene.rig().cameras().iter().enumerate() {
@@ -156,7 +156,7 @@ fn a_person_covers_pixels_and_casts_a_shadow() {
 }
 
 #[test]
-fn clock_offsets_and_dropped_frames_are_in_the_truth() {
+fn clock_offsets_and_dropped_frames_are_in_the_ground_truth() {
     let mut settings = Settings {
         rig: RigChoice::parse("ring:2").unwrap(),
         ..Settings::default()
@@ -210,7 +210,7 @@ fn crowd(others: u64) -> Arc<Scene> {
 }
 
 #[test]
-fn the_truth_and_the_mask_are_the_subjects_alone() {
+fn the_ground_truth_and_the_mask_contain_only_the_subject() {
     let (alone, among) = (crowd(0), crowd(4));
     let mut n_hidden = 0;
     for (camera, frame) in (0..3).flat_map(|camera| [0, 40, 80].map(|frame| (camera, frame))) {
@@ -234,7 +234,7 @@ fn the_truth_and_the_mask_are_the_subjects_alone() {
 }
 
 #[test]
-fn others_stand_around_and_are_not_the_subject() {
+fn bystanders_are_drawn_and_are_not_the_subject() {
     let scene = crowd(4);
     let places: Vec<Vector3<f64>> = scene
         .others

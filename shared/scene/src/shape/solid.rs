@@ -149,7 +149,7 @@ mod tests {
         /// Compares with a brute-force computation, in which a cone is the union of the balls between its ends (up to an error from the
         /// finite number of balls).
         #[test]
-        fn a_cone_is_the_union_of_balls(
+        fn a_cone_equals_the_union_of_its_balls(
             x in -1.0_f32..1.0, y in -1.0_f32..1.0, z in -1.0_f32..2.0,
             first in 0.1_f32..0.4, second in 0.1_f32..0.4,
         ) {

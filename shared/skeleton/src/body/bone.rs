@@ -127,7 +127,7 @@ mod tests {
     use crate::body::N_JOINTS;
 
     #[test]
-    fn the_joints_of_the_bones_are_those_of_their_names() {
+    fn bones_connect_the_joints_in_their_names() {
         let joints = crate::PARSE14.joints;
         assert_eq!(joints.len(), N_JOINTS);
         assert_eq!(joints[NECK].name, "neck");
@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sides_are_pairs_of_the_same_kind() {
+    fn left_and_right_bones_are_pairs_of_the_same_kind() {
         for [right, left] in SIDES {
             assert_eq!(BONES[right].kind, BONES[left].kind);
             assert_eq!(BONES[right].name.replace("right", "left"), BONES[left].name);
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn joints_that_are_no_numbers_are_missing() {
+    fn joints_that_are_not_finite_count_as_missing() {
         let mut joints = [Some(Point3::origin()); N_JOINTS];
         joints[3] = Some(Point3::new(f64::NAN, 0.0, 0.0));
         joints[4] = Some(Point3::new(0.0, f64::INFINITY, 0.0));

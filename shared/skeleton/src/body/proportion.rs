@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_adds_up_to_its_stature() {
+    fn bone_lengths_add_up_to_the_stature() {
         let of = |kind: Kind| kind.proportion();
         let parts = [Kind::LowerLeg, Kind::UpperLeg, Kind::Trunk, Kind::Head].map(of);
         let adult: f64 = parts.iter().map(|part| part.adult).sum();

@@ -205,7 +205,7 @@ fn messages_of_other_senders_and_undecodable_messages_are_refused() {
 }
 
 #[test]
-fn it_is_over_when_every_input_has_ended_and_every_frame_was_returned() {
+fn the_inbox_is_finished_when_every_input_has_ended_and_every_frame_was_returned() {
     let ([first, second], mut inbox) = two_views(rules(Delivery::Lossless));
     let counts = Counts::default();
     first.send(message(0, 0));
@@ -296,7 +296,7 @@ fn with_lossless_delivery_frames_wait_for_optional_messages() {
 }
 
 #[test]
-fn a_slow_stage_skips_to_the_latest_frame_only_where_frames_may_be_lost() {
+fn a_slow_stage_skips_to_the_latest_frame_only_if_frames_may_be_lost() {
     for (delivery, expected) in [(Delivery::Realtime, 1), (Delivery::Lossless, 5)] {
         let skipping = Rules {
             skips: Some(2),

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_coin_has_the_theoretical_width() {
+    fn the_interval_of_a_coin_toss_has_the_theoretical_width() {
         let coin: Vec<f64> = (0..400).map(|i| f64::from(i % 2)).collect();
         let settings = Bootstrap {
             n_resamples: 4000,
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_any_number_is_that_of_the_mean_for_the_mean() {
+    fn the_general_bootstrap_interval_equals_the_interval_of_the_mean() {
         let coin: Vec<Vec<f64>> = (0..400).map(|i| vec![f64::from(i % 2)]).collect();
         let mean = |values: &[f64]| {
             let n = values.len() as f64;

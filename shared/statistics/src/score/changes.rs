@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn improvements_are_positive_and_the_outermost_bins_include_the_rest() {
+    fn improvements_are_positive_and_the_outermost_bins_are_open() {
         let mut changes = Changes::new(20.0, 4, 0.5);
         for (before, after) in [
             (100.0, 1.0),
@@ -95,7 +95,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_change_is_in_one_bin_and_exchanging_the_two_mirrors_them(
+        fn every_change_is_in_one_bin_and_swapping_before_and_after_mirrors_the_bins(
             pairs in prop::collection::vec((0.0..200.0_f64, 0.0..200.0_f64), 0..50),
         ) {
             let count = |swap: bool| {

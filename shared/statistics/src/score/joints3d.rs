@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_that_is_not_found_is_infinitely_far() {
+    fn a_joint_that_was_not_found_has_an_infinite_error() {
         let truth = [Some([0.0; 3]), Some([0.0; 3]), None];
         let found = [Some([3.0, 4.0, 0.0]), None, Some([0.0; 3])];
         let got = joint_errors(&found, &truth);
@@ -122,7 +122,7 @@ mod tests {
         }
 
         #[test]
-        fn no_small_rotation_fits_better(
+        fn no_slightly_different_rotation_fits_better(
             truth in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 5),
             found in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 5),
             axis in prop::array::uniform3(-0.1..0.1_f64),

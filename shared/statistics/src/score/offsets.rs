@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn outwards_is_positive_on_both_sides() {
+    fn the_outward_direction_is_positive_on_both_sides() {
         let rows = offsets_after(|joints| {
             joints[0][0] -= 12.0;
             joints[5][0] += 12.0;

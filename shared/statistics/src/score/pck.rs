@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_limit_is_a_share_of_the_longer_side_plus_a_pixel() {
+    fn the_limit_is_a_fraction_of_the_longer_side_plus_one_pixel() {
         let truth = [[0.0, 0.0], [10.0, 99.0]];
         let found = |off: f64| joints_found(&[[off, 0.0], [10.0, f64::NAN]], &truth, 0.1);
         assert_eq!(found(10.0), [true, false]);

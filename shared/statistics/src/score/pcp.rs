@@ -106,13 +106,13 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_is_all_correct() {
+    fn the_ground_truth_is_completely_correct() {
         let got = pcp(&person(), &person(), PcpRule::BothEnds);
         assert_eq!((got.correct, got.percent()), (10, 100.0));
     }
 
     #[test]
-    fn one_bad_end_fails_the_strict_rule_and_passes_the_mean() {
+    fn one_wrong_end_fails_the_strict_rule_and_passes_the_mean_rule() {
         let truth = person();
         let mut found = truth;
         let length = (truth[12][0] - truth[13][0]).hypot(truth[12][1] - truth[13][1]);

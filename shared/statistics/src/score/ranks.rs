@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_separating_score_has_area_1_and_a_constant_a_half() {
+    fn a_separating_score_has_area_1_and_a_constant_score_has_area_one_half() {
         let separating = [(1.0, false), (2.0, false), (3.0, true), (4.0, true)];
         assert_eq!(area_under_roc(&separating), Some(1.0));
         let wrong = separating.map(|(score, is)| (score, !is));
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn without_both_kinds_there_is_no_area() {
+    fn without_positive_and_negative_samples_there_is_no_area() {
         assert_eq!(area_under_roc(&[(1.0, true), (2.0, true)]), None);
         assert_eq!(area_under_roc(&[(1.0, false)]), None);
         assert_eq!(area_under_roc(&[]), None);
@@ -96,7 +96,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_area_is_the_share_of_pairs_in_the_right_order(
+        fn the_area_is_the_fraction_of_pairs_in_the_right_order(
             samples in prop::collection::vec((0..6_i32, any::<bool>()), 0..40),
         ) {
             let samples: Vec<(f64, bool)> =

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_has_a_line_for_every_rule_and_share() {
+    fn the_table_has_a_row_for_every_rule_and_fraction() {
         let truth = person();
         let expected = "\
 1 images, nothing found on 0

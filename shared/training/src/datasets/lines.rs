@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_unknown_joint_is_nan_and_not_visible() {
+    fn an_unknown_joint_is_written_as_nan_and_not_visible() {
         let (person, name) = parse_line(r#"{"image":"a/b.png","joints":[[1,2.5],null]}"#).unwrap();
         assert_eq!(person.joints[0], [1.0, 2.5]);
         assert!(person.joints[1][0].is_nan());

@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_is_found_by_its_name() {
+    fn every_kind_of_data_set_is_found_by_its_name() {
         for kind in FaultKind::ALL {
             assert_eq!(FaultKind::by_name(kind.name()), Some(kind));
         }

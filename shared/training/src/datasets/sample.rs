@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mirror_exchanges_sides() {
+    fn the_mirror_image_swaps_left_and_right() {
         let sample = sample_with_dot(Size::new(30, 20), [8, 10]);
         let mirrored = sample.mirrored(&MIRROR);
         assert_eq!(

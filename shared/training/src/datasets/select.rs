@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_has_rows_and_file_names_of_images() {
+    fn a_list_contains_row_numbers_and_image_file_names() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("list.txt");
         fs::write(&path, " im7.jpg\n\n2-3\n").unwrap();

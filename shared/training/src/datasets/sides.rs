@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn crossed_hands_and_unknown_joints_have_no_influence() {
+    fn crossed_hands_and_unknown_joints_do_not_affect_the_sides() {
         let mut crossed = facing();
         crossed.joints.swap(6, 11);
         crossed.joints[0] = [f64::NAN; 2];
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn without_mirrored_joints_nothing_is_exchanged() {
+    fn without_mirrored_joints_no_sides_are_swapped() {
         let own: Vec<usize> = (0..14).collect();
         assert_eq!(
             Sides::Seen.of(from_behind(&facing()), &own),

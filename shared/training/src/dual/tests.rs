@@ -24,7 +24,7 @@ fn cost(group: usize, of_unit: f64) -> Cost<usize> {
 }
 
 #[test]
-fn two_points_are_separated_in_the_middle() {
+fn two_points_are_separated_at_the_midpoint() {
     // The model is w x + b, with a negative example at 1 and a positive one at 3. Without regularisation of b, w = 1 and b = -2. As b is
     // regularised too, the problem is min w^2 + b^2 with w + b <= -1 and 3 w + b >= 1.
     let mut machine = Machine::new(2, 0..0);
@@ -39,7 +39,7 @@ fn two_points_are_separated_in_the_middle() {
 }
 
 #[test]
-fn a_cheap_example_is_given_up() {
+fn an_example_with_low_cost_is_violated() {
     let mut machine = Machine::new(1, 0..0);
     machine.add(cost(0, 10.0), (), demand(&[1.0], 1.0), 0.0);
     machine.add(cost(1, 0.1), (), demand(&[-1.0], 1.0), 0.0);
@@ -140,7 +140,7 @@ proptest! {
     }
 
     #[test]
-    fn the_same_machine_can_be_made_from_its_entries(examples in examples(), cut in 0_usize..6) {
+    fn the_svm_can_be_restored_from_its_entries(examples in examples(), cut in 0_usize..6) {
         let effort = Effort { tolerance: 1e-4, max_passes: 20 };
         let mut machine = filled(&examples);
         solve(&mut machine, effort);
@@ -161,7 +161,7 @@ proptest! {
     }
 
     #[test]
-    fn removed_examples_had_no_share_in_the_solution(examples in examples()) {
+    fn removed_examples_were_not_support_vectors(examples in examples()) {
         let mut machine = filled(&examples);
         solve(&mut machine, Effort { tolerance: 1e-6, max_passes: 2000 });
         let (before, solution) = (machine.gap(), machine.solution());

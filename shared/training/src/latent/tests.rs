@@ -116,7 +116,7 @@ fn the_best_pose_near_the_marks_is_found() {
 }
 
 #[test]
-fn an_example_times_the_vector_is_the_score_of_its_pose() {
+fn the_product_of_example_and_weights_is_the_score_of_the_pose() {
     let (shape, v) = (shape(), vector(11));
     let model = Arc::new(shape.model(&v, 0.0).unwrap());
     let picture = noise(64, 72, 3);

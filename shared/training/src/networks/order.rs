@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shuffled_order_has_everybody_once() {
+    fn a_shuffled_order_contains_every_sample_once() {
         for n in [1, 2, 3, 17, 64, 1000] {
             let mut seen: Vec<usize> = (0..n).map(|place| shuffled(place, n, 5)).collect();
             seen.sort_unstable();

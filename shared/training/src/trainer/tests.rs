@@ -262,7 +262,7 @@ fn an_unreadable_background_is_named() {
 }
 
 #[test]
-fn without_backgrounds_nothing_is_trained() {
+fn training_without_backgrounds_is_refused() {
     let (settings, watch) = (settings(), Quiet::endless());
     let album = Figures {
         n_people: 10,
@@ -274,7 +274,7 @@ fn without_backgrounds_nothing_is_trained() {
 }
 
 #[test]
-fn people_stay_in_the_working_set_however_well_they_are_separated() {
+fn people_stay_in_the_working_set_even_if_well_separated() {
     let (album, watch) = (figures(), Quiet::endless());
     // With these settings, hardly any example whose share is 0 is kept.
     let settings = Settings {

@@ -26,7 +26,7 @@ fn settings(n_types: usize, types_by: TypesBy) -> Settings {
 }
 
 #[test]
-fn clusters_are_found_the_largest_first() {
+fn clusters_are_sorted_by_size() {
     let types = cluster(&people(), (&PARENTS, None), &settings(3, TypesBy::Parent));
     let of_second: Vec<_> = types.of_person.iter().map(|labels| labels[1]).collect();
     assert_eq!(types.anchors[1][0], [6, 0], "half of the people");
@@ -38,7 +38,7 @@ fn clusters_are_found_the_largest_first() {
 }
 
 #[test]
-fn neighbours_separate_types_that_the_parent_does_not() {
+fn neighbours_distinguish_types_that_the_parent_does_not() {
     let by_parent = cluster(&people(), (&PARENTS, None), &settings(3, TypesBy::Parent));
     assert_eq!(
         by_parent.anchors[2].len(),
@@ -104,7 +104,7 @@ fn with_mirror_images() -> Vec<Vec<[f64; 2]>> {
 }
 
 #[test]
-fn either_side_has_the_mirrored_types_of_the_other() {
+fn the_types_of_one_side_mirror_those_of_the_other() {
     let people = with_mirror_images();
     for by in [TypesBy::Parent, TypesBy::Neighbours] {
         let types = cluster(&people, (&BODY, Some(&SIDES)), &settings(4, by));
@@ -124,7 +124,7 @@ fn either_side_has_the_mirrored_types_of_the_other() {
 }
 
 #[test]
-fn one_type_is_its_own_mirror_image() {
+fn a_single_type_is_its_own_mirror_image() {
     let people = with_mirror_images();
     let types = cluster(
         &people,

@@ -96,7 +96,7 @@ fn a_model_with_26_parts_has_424_values_with_distinct_names() {
 }
 
 #[test]
-fn spring_and_bias_scores_are_those_of_the_model() {
+fn spring_and_bias_scores_equal_those_of_the_model() {
     let at = numbers(&[pose(2.0, [8, 9])]);
     // Displacement: parent (5, 4) + anchor (1, 2) - child (8, 9) = (-2, -3).
     let expected = -(0.01 * 4.0 - 0.1 * 2.0 + 0.02 * 9.0 - 0.2 * 3.0);
@@ -111,7 +111,7 @@ fn spring_and_bias_scores_are_those_of_the_model() {
 }
 
 #[test]
-fn types_and_scores_are_those_of_the_pose() {
+fn types_and_scores_equal_those_of_the_pose() {
     let at = numbers(&[pose(2.0, [8, 9])]);
     assert_eq!((at("part 1 type_1"), at("part 1 type_2")), (0.0, 1.0));
     assert_eq!((at("part 2 type_1"), at("part 2 type_6")), (1.0, 0.0));
@@ -137,7 +137,7 @@ fn distances_are_measured_in_box_sides() {
 }
 
 #[test]
-fn inside_is_negative_for_a_part_outside_the_frame() {
+fn the_distance_inside_the_frame_is_negative_for_a_part_outside() {
     // The padding is one cell. Column 0 begins at -4 pixels, and the centre of its box is at 1.5.
     let at = numbers(&[pose(2.0, [0, 8])]);
     assert!((at("part 2 inside") - 1.5 / 12.0).abs() < 1e-6);

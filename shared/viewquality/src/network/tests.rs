@@ -58,7 +58,7 @@ fn a_network_may_take_only_the_evidence() {
 }
 
 #[test]
-fn a_network_may_take_both() {
+fn a_network_may_take_the_picture_and_the_evidence() {
     let mut net = of_colours();
     let k = n_evidence(N_PARTS);
     net.inputs.push((

@@ -156,13 +156,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read() {
+    fn written_weights_are_read_back() {
         let network = network(3);
         assert_eq!(Network::from_bytes(&network.to_bytes()), Ok(network));
     }
 
     #[test]
-    fn sizes_that_do_not_fit_are_told() {
+    fn wrong_sizes_are_reported() {
         let payload = |sizes: [u32; 2], n: usize| {
             let mut bytes: Vec<u8> = sizes.iter().flat_map(|size| size.to_le_bytes()).collect();
             bytes.resize(8 + n, 0);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_none_are_told() {
+    fn numbers_that_are_not_finite_are_reported() {
         let mut network = network(2);
         network.mean[7] = f32::NAN;
         let error = Network::from_bytes(&network.to_bytes()).unwrap_err();
@@ -187,13 +187,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn any_bytes_are_parsed_as_weights_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             prop_assert!(Network::from_bytes(&bytes).is_err());
             prop_assert!(Network::from_bytes(&ENVELOPE.seal(&bytes)).is_err());
         }
 
         #[test]
-        fn a_changed_byte_is_found(at in 0.0..1.0_f64, bit in 0..8_u8) {
+        fn a_changed_byte_in_the_weights_is_detected(at in 0.0..1.0_f64, bit in 0..8_u8) {
             let mut bytes = network(1).to_bytes();
             let at = (at * bytes.len() as f64) as usize;
             bytes[at] ^= 1 << bit;

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_lies_where_the_frame_has_it() {
+    fn the_tile_has_the_head_at_the_place_in_the_frame() {
         let rgb = frame();
         let frame = Rgb8View::new(200, 300, &rgb).unwrap();
         let bounds = [50.0, 40.0, 110.0, 239.0];
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_box_gives_no_tile() {
+    fn an_invalid_box_gives_no_tile() {
         let rgb = frame();
         let frame = Rgb8View::new(200, 300, &rgb).unwrap();
         let around = |bounds, head| Tile::around(frame, bounds, head, &mut Sampler::default());
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_patch_is_the_patch_in_a_mirror() {
+    fn a_mirrored_patch_is_the_mirror_image_of_the_patch() {
         let rgb = frame();
         let frame = Rgb8View::new(200, 300, &rgb).unwrap();
         let tile = Tile::around(

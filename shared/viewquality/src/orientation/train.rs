@@ -334,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn what_can_be_seen_is_learned_and_held_on_others() {
+    fn visible_orientation_is_learned_and_generalises_to_others() {
         let settings = Settings {
             hidden: 8,
             passes: 6,
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bits_do_not_depend_on_threads() {
+    fn the_result_does_not_depend_on_the_number_of_threads() {
         let samples = made_up(20, 3);
         let settings = Settings {
             hidden: 4,
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn it_ends_when_told_and_without_samples() {
+    fn training_ends_on_request_and_without_samples() {
         assert_eq!(train(&[], &Settings::default(), |_| true), None);
         let mut n = 0;
         let stopped = train(&made_up(4, 1), &Settings::default(), |_| {

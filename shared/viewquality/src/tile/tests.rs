@@ -69,7 +69,7 @@ fn at_scale_1_on_whole_pixels_a_tile_is_a_crop() {
 }
 
 #[test]
-fn beyond_the_frame_its_border_is_repeated() {
+fn outside_the_frame_the_border_is_repeated() {
     let shape = TileShape {
         height: 3,
         width: 3,
@@ -190,7 +190,7 @@ proptest! {
     }
 
     #[test]
-    fn buffers_of_another_tile_have_no_effect((size, data, tile) in scene(), (other, bytes, first) in scene()) {
+    fn reused_buffers_have_no_effect_on_a_tile((size, data, tile) in scene(), (other, bytes, first) in scene()) {
         let mut sampler = Sampler::default();
         let mut out = vec![f32::NAN; first.shape.n_values()];
         sampler.sample(Rgb8View::new(other[0], other[1], &bytes).unwrap(), &first, &PLAIN, &mut out);

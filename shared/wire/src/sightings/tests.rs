@@ -101,7 +101,7 @@ proptest! {
 }
 
 #[test]
-fn numbers_that_no_view_sends_are_refused() {
+fn impossible_numbers_of_a_view_are_refused() {
     let person = Sighting {
         joints: [Some([3.0, 4.0]); 14],
         heats: [0.5; 14],

@@ -77,7 +77,7 @@ fn a_child_is_possible_with_noise() {
 }
 
 #[test]
-fn a_skeleton_on_somebodys_chest_is_nobody() {
+fn a_tiny_skeleton_on_the_chest_of_a_person_is_rejected() {
     for posture in POSTURES {
         let person = posture(1.76);
         let small = person.map(|joint| joint.map(|joint| joint * (0.72 / 1.76)));
@@ -91,7 +91,7 @@ fn a_skeleton_on_somebodys_chest_is_nobody() {
 }
 
 #[test]
-fn a_giant_is_nobody() {
+fn a_giant_is_rejected() {
     let giant = testing::standing(1.7).map(|joint| joint.map(|joint| joint * 1.5));
     assert!(matches!(
         verdict(&giant).nobody,
@@ -100,7 +100,7 @@ fn a_giant_is_nobody() {
 }
 
 #[test]
-fn joints_thrown_about_are_nobody() {
+fn random_joints_are_rejected() {
     let mut random = fastrand::Rng::with_seed(3);
     let mut n_nobody = 0;
     for _ in 0..200 {
@@ -124,7 +124,7 @@ fn an_arm_over_a_metre_long_loses_its_joint() {
 }
 
 #[test]
-fn every_joint_far_away_is_found_and_no_other() {
+fn every_outlying_joint_is_removed_and_no_other() {
     for posture in POSTURES {
         let person = posture(1.7);
         for joint in 0..N_JOINTS {
@@ -165,7 +165,7 @@ fn sides_that_differ_too_much_lose_a_joint() {
 }
 
 #[test]
-fn of_two_joints_alike_the_less_certain_is_dropped() {
+fn of_two_similar_joints_the_less_certain_one_is_dropped() {
     let person = moved(&testing::standing(1.7), 2, [0.0, -0.25, 0.0]);
     let person = moved(&person, 3, [0.0, 0.25, 0.0]);
     for (joint, other) in [(2, 3), (3, 2)] {
@@ -177,7 +177,7 @@ fn of_two_joints_alike_the_less_certain_is_dropped() {
 }
 
 #[test]
-fn little_of_a_person_is_nobody() {
+fn too_few_bones_are_rejected() {
     let person = testing::standing(1.7);
     let arm: Joints = core::array::from_fn(|i| person[i].filter(|_| (6..9).contains(&i)));
     let reason = verdict(&arm).nobody;
@@ -221,7 +221,7 @@ fn the_person_that_was_learned_does_not_shrink() {
 }
 
 #[test]
-fn the_mirror_image_gets_the_mirrored_verdict() {
+fn the_mirror_image_gives_the_mirrored_result() {
     let mut random = fastrand::Rng::with_seed(5);
     for _ in 0..100 {
         let person = testing::noisy(&testing::walking(1.6), 0.15, 0.1, &mut random);
@@ -255,7 +255,7 @@ fn covariances() -> impl Strategy<Value = Covariances> {
 
 proptest! {
     #[test]
-    fn whatever_comes_in_numbers_come_out(joints in joints(), covariances in covariances(), learned in any::<bool>()) {
+    fn any_input_gives_finite_numbers(joints in joints(), covariances in covariances(), learned in any::<bool>()) {
         let mut lengths = Lengths::default();
         if learned {
             testing::learn(&mut lengths, &testing::walking(1.7));

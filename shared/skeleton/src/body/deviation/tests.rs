@@ -16,7 +16,7 @@ fn people_of_all_ages_hardly_deviate() {
 }
 
 #[test]
-fn ordinary_noise_is_ordinary() {
+fn usual_noise_gives_a_usual_deviation() {
     let mut random = fastrand::Rng::with_seed(1);
     let sum: f64 = (0..200)
         .map(|_| {
@@ -32,7 +32,7 @@ fn ordinary_noise_is_ordinary() {
 }
 
 #[test]
-fn what_is_no_person_deviates_more() {
+fn joints_that_are_not_a_person_deviate_more() {
     let person = testing::noisy(
         &testing::walking(1.7),
         0.03,

@@ -73,7 +73,7 @@ fn memory_is_bounded_and_the_last_frames_count() {
 }
 
 #[test]
-fn a_reset_forgets_the_person() {
+fn a_reset_removes_the_learned_lengths() {
     let mut lengths = Lengths::default();
     testing::learn(&mut lengths, &testing::standing(1.7));
     assert_eq!(lengths.n_learned(), N_BONES);

@@ -8,7 +8,7 @@ fn one(_kind: Kind) -> f64 {
 }
 
 #[test]
-fn the_reach_is_the_way_along_the_bones() {
+fn the_reach_is_the_distance_along_the_bones() {
     assert_eq!(between(6, 8, one), 2.0);
     assert_eq!(between(8, 6, one), 2.0);
     assert_eq!(between(0, 2, one), 2.0);
@@ -22,7 +22,7 @@ fn the_reach_is_the_way_along_the_bones() {
 }
 
 #[test]
-fn a_joint_is_alone_where_its_neighbours_are_missing() {
+fn a_joint_without_neighbours_is_reported_as_alone() {
     let mut joints = testing::standing(1.7);
     let all = (1 << N_JOINTS) - 1;
     assert!(pieces(&joints).iter().all(|piece| *piece == all));

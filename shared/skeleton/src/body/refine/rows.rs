@@ -159,7 +159,7 @@ mod tests {
     use crate::body::testing;
 
     #[test]
-    fn derivatives_are_those_of_the_residual() {
+    fn derivatives_equal_those_of_the_residual() {
         let joints = testing::noisy(
             &testing::walking(1.3),
             0.05,

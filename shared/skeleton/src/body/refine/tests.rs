@@ -43,7 +43,7 @@ fn unusual(joints: &Joints) -> Joints {
 }
 
 #[test]
-fn noise_along_the_depth_becomes_less() {
+fn noise_along_the_viewing_direction_is_reduced() {
     for tall in [1.62, 1.76] {
         let [before, after] = errors(|joints| *joints, tall, None);
         assert!(after < 0.88 * before, "{tall}: {before} {after}");
@@ -67,7 +67,7 @@ fn unusual_bodies_are_not_made_worse() {
 }
 
 #[test]
-fn a_child_with_the_proportions_of_an_adult_is_not_made_worse() {
+fn a_child_with_adult_proportions_is_not_made_worse() {
     let [before, after] = errors(
         |joints| joints.map(|joint| joint.map(|joint| joint * 0.5)),
         2.0,
@@ -77,7 +77,7 @@ fn a_child_with_the_proportions_of_an_adult_is_not_made_worse() {
 }
 
 #[test]
-fn a_perfect_body_stays_where_it_is() {
+fn a_perfect_body_is_unchanged() {
     for posture in POSTURES {
         let person = posture(1.7);
         let found = refine(&person, &NO_COVARIANCES, None);
@@ -86,7 +86,7 @@ fn a_perfect_body_stays_where_it_is() {
 }
 
 #[test]
-fn covariances_shrink_and_stay_covariances() {
+fn covariances_shrink_and_stay_positive_definite() {
     let person = testing::noisy(
         &testing::walking(1.7),
         0.05,

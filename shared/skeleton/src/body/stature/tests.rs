@@ -34,14 +34,14 @@ fn one_limb_that_is_wrong_changes_little() {
 }
 
 #[test]
-fn an_adult_scaled_is_as_much_taller() {
+fn scaling_an_adult_scales_the_stature() {
     let joints = testing::bent(1.7);
     let scaled = joints.map(|joint| joint.map(|joint| joint * 1.2));
     assert!((stature_of(&scaled) - 1.2 * stature_of(&joints)).abs() < 1e-9);
 }
 
 #[test]
-fn turning_moving_and_mirroring_change_nothing() {
+fn rotating_moving_and_mirroring_do_not_change_the_stature() {
     let joints = testing::noisy(
         &testing::sitting(1.6),
         0.05,
@@ -74,7 +74,7 @@ fn the_uncertainty_covers_the_noise() {
 }
 
 #[test]
-fn too_few_bones_tell_nothing() {
+fn too_few_bones_give_no_stature() {
     let arm = testing::standing(1.7);
     let arm: Joints = core::array::from_fn(|i| arm[i].filter(|_| (6..9).contains(&i) || i == 12));
     assert_eq!(stature(&arm), None);

@@ -66,7 +66,7 @@ fn umpm(root: &Path) {
 }
 
 #[test]
-fn every_second_pose_of_umpm_belongs_to_a_frame() {
+fn every_second_pose_in_umpm_belongs_to_a_video_frame() {
     let dir = tempfile::tempdir().unwrap();
     umpm(dir.path());
     let poses = |alignment| {
@@ -102,7 +102,7 @@ fn a_packed_video_of_umpm_is_an_error_with_advice() {
 }
 
 #[test]
-fn the_last_fifth_can_be_chosen() {
+fn the_last_fifth_of_the_frames_can_be_selected() {
     let dir = tempfile::tempdir().unwrap();
     umpm(dir.path());
     let options = Options {
@@ -169,7 +169,7 @@ fn an_invalid_line_of_a_synthetic_scene_is_named() {
 }
 
 #[test]
-fn any_other_sequence_can_be_described() {
+fn any_other_sequence_can_be_described_by_a_file() {
     let dir = tempfile::tempdir().unwrap();
     let (folder, file) = (dir.path(), dir.path().join("walk.toml"));
     geometry::files::write(
@@ -214,7 +214,7 @@ fn any_other_sequence_can_be_described() {
 }
 
 #[test]
-fn an_empty_folder_is_unknown() {
+fn an_empty_folder_is_not_recognised_as_a_data_set() {
     let dir = tempfile::tempdir().unwrap();
     let got = read(dir.path(), &Options::default());
     assert!(matches!(got, Err(SequenceError::Unknown { .. })), "{got:?}");

@@ -128,7 +128,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_gradients_of_the_cost_are_its_changes() {
+    fn gradients_of_the_cost_equal_finite_differences() {
         let cells = 6;
         let mut rng = Rng::with_seed(3);
         let mut truth = Truth {

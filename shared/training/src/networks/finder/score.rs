@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_box_counts_once_and_one_over_somebody_who_does_not_count_is_not_false() {
+    fn a_person_is_matched_by_one_box_and_boxes_on_excluded_people_are_not_false_alarms() {
         let around = |left: f32, counts| Around {
             outline: [left, 0.0, left + 10.0, 30.0],
             counts,

@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gradients_of_the_cost_are_its_changes() {
+    fn gradients_of_the_cost_equal_finite_differences() {
         let (n, cells) = (2, [4, 3]);
         let mut rng = Rng::with_seed(3);
         let mut numbers = |n: usize| -> Vec<f32> { (0..n).map(|_| rng.f32()).collect() };
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expected_error_out_of_bounds_is_not_pushed_further() {
+    fn an_expected_error_out_of_bounds_has_no_gradient() {
         let truth = Truth {
             cells: [1, 1],
             places: vec![5.0, 5.0, 0.0, 0.0],

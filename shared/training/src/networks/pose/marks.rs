@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_extra_keypoint_counts_where_the_teacher_is_sure_of_it_and_finds_the_joint_beside_it() {
+    fn an_extra_keypoint_is_trained_if_the_teacher_is_certain_and_agrees_on_the_nearest_joint() {
         let heel = N_JOINTS + 2;
         let ankle = BESIDE[2];
         let mut marks = Marks {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn the_joint_beside_a_keypoint_has_its_side() {
+    fn the_nearest_joint_of_a_keypoint_has_the_same_side() {
         for extra in 0..BESIDE.len() {
             let mirrored = MIRROR[N_JOINTS + extra] - N_JOINTS;
             assert_eq!(MIRROR[BESIDE[extra]], BESIDE[mirrored], "{extra}");

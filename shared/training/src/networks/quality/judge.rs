@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_is_the_best_prediction_and_a_constant_is_chance_level() {
+    fn the_true_errors_are_the_best_prediction_and_a_constant_has_chance_level() {
         let samples = [sample(1.0), sample(5.0), sample(3.0), sample(9.0)];
         let all: Vec<&Sample> = samples.iter().collect();
         let tau = tau(&all);

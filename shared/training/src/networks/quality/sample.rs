@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_better_reading_of_left_and_right_counts() {
+    fn the_better_assignment_of_left_and_right_counts() {
         let truth: Vec<[f64; 2]> = (0..N_PARTS).map(|part| [part as f64 * 10.0, 5.0]).collect();
         let exchanged: Vec<[f64; 2]> = MIRROR.iter().map(|part| truth[*part]).collect();
         assert_eq!(part_errors(&truth, &truth), [0.0; N_PARTS]);

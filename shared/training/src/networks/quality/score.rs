@@ -56,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn a_perfect_score_has_area_1_and_a_constant_a_half() {
+    fn a_perfect_score_has_area_1_and_a_constant_score_has_area_one_half() {
         let positive = [false, true, false, true];
         assert_eq!(area(&[1.0, 3.0, 2.0, 4.0], &positive), Some(1.0));
         assert_eq!(area(&[1.0; 4], &positive), Some(0.5));
@@ -76,7 +76,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_area_is_the_share_of_pairs_in_the_right_order(
+        fn the_area_is_the_fraction_of_pairs_in_the_right_order(
             cases in proptest::collection::vec((0_u8..12, any::<bool>()), 2..40)
         ) {
             let scores: Vec<f32> = cases.iter().map(|case| f32::from(case.0)).collect();

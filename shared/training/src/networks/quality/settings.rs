@@ -206,7 +206,7 @@ mod tests {
     type Change = fn(&mut Settings);
 
     #[test]
-    fn the_defaults_are_valid_and_invalid_settings_are_named() {
+    fn the_defaults_are_valid_and_errors_name_invalid_settings() {
         assert_eq!(Settings::default().check(), Ok(()));
         let change: [(&str, Change); 5] = [
             ("batch", |settings| settings.batch = 0),
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_of_a_loss_is_its_change() {
+    fn the_slope_of_a_loss_equals_finite_differences() {
         for loss in [Loss::L2, Loss::Robust] {
             for off in [-3.0, -0.7, 0.0, 0.2, 0.9, 1.1, 5.0] {
                 let change = (loss.cost(off + 1e-2) - loss.cost(off - 1e-2)) / 2e-2;

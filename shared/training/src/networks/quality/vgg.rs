@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn every_convolution_gets_its_weights() {
+    fn every_convolution_layer_gets_its_weights() {
         let read = parse(&file(|_| ())).unwrap();
         assert_eq!(read.len(), 26);
         let of = |name: &str| read.iter().find(|parameter| parameter.name == name).unwrap();
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_vgg_16_is_refused_by_the_name_of_the_layer() {
+    fn files_that_are_not_vgg_16_are_refused_with_the_layer_name() {
         let said = |change: &dyn Fn(&mut String)| parse(&file(change)).unwrap_err().to_string();
         let renamed =
             said(&|header| *header = header.replace("features.28.bias", "features.30.bias"));

@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn products_of_all_shapes_are_sums_of_products() {
+    fn matrix_products_of_all_shapes_equal_plain_loops() {
         let values = |n: usize, step: f32| -> Vec<f32> {
             (0..n).map(|at| (at as f32 * step).sin()).collect()
         };

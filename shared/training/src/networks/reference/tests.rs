@@ -217,7 +217,7 @@ fn lesson_by(
 }
 
 #[test]
-fn the_gradient_of_every_operation_is_its_change() {
+fn the_gradient_of_every_operation_equals_finite_differences() {
     let step = 2e-3;
     for network in all() {
         let shown = shown(&network, 3);
@@ -254,7 +254,7 @@ fn the_gradient_of_every_operation_is_its_change() {
 }
 
 #[test]
-fn every_operation_that_leads_to_the_map_learns_it() {
+fn every_operation_on_the_path_to_the_map_passes_gradients() {
     for network in all() {
         let sees_map = !matches!(
             network,
@@ -266,7 +266,7 @@ fn every_operation_that_leads_to_the_map_learns_it() {
 }
 
 #[test]
-fn the_file_of_every_operation_gives_the_same_values() {
+fn the_onnx_file_of_every_operation_gives_the_same_values() {
     for network in all() {
         let shown = shown(&network, 2);
         let parameters = parameters(&network);
@@ -311,7 +311,7 @@ fn the_file_of_every_operation_gives_the_same_values() {
 }
 
 #[test]
-fn the_number_of_threads_changes_no_bit() {
+fn the_number_of_threads_does_not_change_a_bit() {
     let learned = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {

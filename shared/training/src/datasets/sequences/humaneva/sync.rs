@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_that_began_later_skip_fewer_frames() {
+    fn cameras_that_started_later_skip_fewer_frames() {
         // At motion capture frame 101, the first camera is at frame 11 and the second at 31: it began 20 frames earlier.
         let got = Sync::new(&[11.0, 31.0].map(|value| Some(offset(value, 101.0, 2.0)))).unwrap();
         assert_eq!(got.image_first, [Some(1), Some(21)]);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn motion_capture_that_began_later_moves_all_cameras() {
+    fn motion_capture_that_started_later_shifts_all_cameras() {
         let got = Sync::new(&[None, Some(offset(11.0, 5.0, 2.0))]).unwrap();
         // Frame 11 corresponds to frame 5, so frame 9 corresponds to frame 1.
         assert_eq!(
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_is_three_numbers() {
+    fn an_offset_consists_of_three_numbers() {
         assert_eq!(
             Offset::parse("73\n82.5 1.9996\n"),
             Some(offset(73.0, 82.5, 1.9996))

@@ -81,7 +81,7 @@ fn evidence_and_picture_agree_for_every_position_of_the_tile() {
 }
 
 #[test]
-fn mirroring_exchanges_errors_and_evidence_and_is_its_own_inverse() {
+fn mirroring_swaps_errors_and_evidence_of_left_and_right_and_is_its_own_inverse() {
     let sample = sample();
     let vary = Vary {
         mirror: 1.0,
@@ -112,7 +112,7 @@ fn mirroring_exchanges_errors_and_evidence_and_is_its_own_inverse() {
 }
 
 #[test]
-fn a_blur_keeps_the_mean_and_flattens() {
+fn a_blur_keeps_the_mean_and_reduces_contrast() {
     let mut planes = vec![0.0; 3 * TILE.height * TILE.width];
     planes[20 * TILE.width + 12] = 1.0;
     blur(&mut planes, TILE, 1.0);

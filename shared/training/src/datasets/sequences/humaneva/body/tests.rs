@@ -145,7 +145,7 @@ fn a_missing_point_is_named() {
 }
 
 #[test]
-fn measures_come_from_the_static_trial_and_the_subjects_file() {
+fn body_measures_come_from_the_static_trial_and_the_subject_file() {
     let still = read(&person(&[Isometry3::identity(); 3]));
     let text = "$HeadOffset = 3\n$LShoulderOffset = 50.5\n$RShoulderOffset = 48\n";
     let got = Measures::new(&still, text).unwrap();
