@@ -22,7 +22,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let is_there = is_there(&lengths);
     let mut poser = Poser::new(trial, &lengths);
     if !(0..trial.slots.len()).any(|slot| poser.pose(slot).seen[0].is_some()) {
-        let why = "BVH: no frame has both hips, which the skeleton hangs on";
+        let why = "BVH: no frame has both hips, which are the root of the skeleton";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     writeln!(out, "HIERARCHY")?;
@@ -204,7 +204,7 @@ fn notes(
     let missing: Vec<&str> = missing.filter_map(|node| node.1.landmark).collect();
     if !missing.is_empty() {
         notes.push(format!(
-            "never seen together with the joint before them, and left out: {}",
+            "left out, because they were never seen together with their parent joint: {}",
             missing.join(", ")
         ));
     }

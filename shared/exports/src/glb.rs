@@ -55,7 +55,7 @@ pub(crate) fn write(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut pieces = bones(&lengths, &rest);
     pieces.extend(keypoints(trial));
     if pieces.is_empty() {
-        let why = "GLB: no bone was seen with both ends, and no keypoint";
+        let why = "GLB: no frame has a bone with both ends, or an extra keypoint";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     }
     let mut store = Store::default();

@@ -34,15 +34,15 @@ pub fn html(page: &Page<'_>) -> String {
     let mut out = begin("Parallax: cameras by a board");
     let own = page.outcome.doubts.iter().map(|doubt| doubt.text(page.names));
     let doubts: Vec<String> = page.more_doubts.iter().cloned().chain(own).collect();
-    let said = ("calibrated", "not to be trusted as it is");
+    let said = ("calibrated", "doubtful");
     verdict(&mut out, said, &doubts);
     about_table(&mut out, page.about);
     cameras(&mut out, page);
     put!(
         out,
-        "<h2>Where the corners were, and how they fit</h2>\n<p><small>Left: every corner in the picture, with what it is off, 25 \
-         times as long; red: left out as wrong. Where there is no corner, the lens is not known. Right: the same from one point; the \
-         circle has a radius of 1 px. A pattern (all outward, all to one side) is a lens of another kind, or a board that is not \
+        "<h2>Where the corners were, and how they fit</h2>\n<p><small>Left: every corner in the picture, with its residual enlarged 25 \
+         times; red: left out as wrong. The lens is not known where there is no corner. Right: all residuals from one point; the circle \
+         has a radius of 1 px. A pattern (all outward, all to one side) indicates an unsuitable lens model, or a board that is not \
          flat.</small></p>\n"
     );
     for (name, camera) in page.names.iter().zip(&page.outcome.cameras) {
@@ -52,14 +52,16 @@ pub fn html(page: &Page<'_>) -> String {
     if page.has_rig {
         put!(
             out,
-            "<h2>The cameras in space</h2>\n<p><small>Obliquely, from above and from the side of the first camera; each line \
-             before a camera is where it looks; grey: the board in every frame that was used. The scale is in metres.</small></p>\n"
+            "<h2>The cameras in space</h2>\n<p><small>Seen obliquely, from above and from the side of the first camera; the line in \
+             front of each camera is its viewing \
+             direction; grey: the board in every frame that was used. The scale is in metres.</small></p>\n"
         );
         put!(out, "{}", space::views(page));
         pairs(&mut out, page);
     }
     numbers(&mut out, page);
-    let drawn = "Ring: the corner as it was seen (purple: left out); line: what it is off, 20 times as long.";
+    let drawn =
+        "Ring: the detected corner (purple: left out); line: its residual, enlarged 20 times.";
     worst(&mut out, drawn, page.worst);
     put!(out, "</html>\n");
     out.into_page()
@@ -130,7 +132,8 @@ fn numbers(out: &mut Html, page: &Page<'_>) {
     put!(
         out,
         "<h2>Every number</h2>\n<p><small>With its standard deviation, if corners are off by {} px (standard deviation along an axis) \
-         and nothing else is wrong. Places are metres in the world of the first camera, rotations degrees.</small></p>\n",
+         and nothing else is wrong. Positions are in metres, in the coordinates of the first camera; rotations are in \
+         degrees.</small></p>\n",
         number(page.outcome.sigma_px, 3)
     );
     for (name, camera) in page.names.iter().zip(&page.outcome.cameras) {

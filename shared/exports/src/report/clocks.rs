@@ -42,8 +42,9 @@ pub fn html(page: &Page<'_>) -> String {
     };
     put!(
         out,
-        "<h2>Cost of every pair over its offset</h2>\n<p><small>{}: lower is better. The offset is what is added to a time of the first camera to have that of the second. Line: the pair's own \
-         best; dashes: its second best; grey: what all cameras together say.</small></p>\n",
+        "<h2>Cost of every pair over its offset</h2>\n<p><small>{}: lower is better. Add the offset to a time of the first camera to \
+         get the time of the second. Line: the best offset of the pair; dashes: its second best offset; grey: the offset from all \
+         cameras together.</small></p>\n",
         Html::constant(cost)
     );
     for (curve, pair) in page.outcome.curves.iter().zip(&page.outcome.pairs) {

@@ -170,16 +170,16 @@ fn limits(out: &mut Html, limits: &[Limit]) {
 fn space(out: &mut Html, page: &Page) {
     let has_truth = page.space.moments.iter().any(|moment| !moment.truth.is_empty());
     let hidden = Html::constant(if has_truth { "" } else { " hidden" });
-    let grey = if has_truth { "; grey: where it is" } else { "" };
+    let grey = if has_truth { "; grey: the truth" } else { "" };
     put!(
         out,
         "<h2>The skeleton in space</h2>\n\
          <canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" \
          aria-label=\"the skeleton in space\"></canvas>\n<p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> \
          <label{}><input id=\"truth\" type=\"checkbox\" checked> truth</label> <span id=\"said\"></span></p>\n\
-         <p class=\"note\">Drag to turn, wheel to come nearer. Colours: <b class=\"right\">right</b>, \
-         <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the body as it was found{}. \
-         The squares of the floor are a metre wide; a red camera has no part in the frame.</p>\n\
+         <p class=\"note\">Drag to rotate, turn the wheel to zoom. Colours: <b class=\"right\">right</b>, \
+         <b class=\"left\">left</b>, <b class=\"centre\">middle</b> of the detected body{}. \
+         The squares of the floor are a metre wide; a red camera does not contribute to the frame.</p>\n\
          <h2>Cameras over time</h2>\n<div class=\"scroll\">\n",
         hidden,
         grey
@@ -187,7 +187,7 @@ fn space(out: &mut Html, page: &Page) {
     put!(out, "{}", timeline::svg(&page.space, &page.marks));
     put!(
         out,
-        "</div>\n<p class=\"note\">A tick is a result in space, green where the view has a part in it.</p>\n"
+        "</div>\n<p class=\"note\">Each tick is a 3D result; it is green if the view contributed to it.</p>\n"
     );
 }
 

@@ -16,7 +16,7 @@ const WIDTH: f64 = 160.0;
 /// Text for a rig with doubts.
 const UNUSABLE: &str = "not to be used";
 /// Text for a rig with cautions.
-const ROUGH: &str = "usable, but not known well";
+const ROUGH: &str = "usable, but uncertain";
 /// Legend of the drawings in pictures.
 const DRAWN: &str = "Each ring is a detected joint; the line leads to the position that the rig predicts from the detections of all \
     cameras.";
@@ -44,7 +44,7 @@ pub fn of_people(
     about_table(&mut out, about);
     put!(
         out,
-        "<p class=\"note\">{} instants over {} s; sides of {} views exchanged; scale to {} %.</p>\n",
+        "<p class=\"note\">{} instants over {} s; sides of {} views swapped; scale known to within {} %.</p>\n",
         outcome.n_instants,
         number(outcome.span_s[1] - outcome.span_s[0], 1),
         outcome.n_exchanged,
@@ -120,17 +120,14 @@ pub fn of_refinement(
     let mut out = begin("Parallax: a rig refined");
     let mut doubts: Vec<String> = outcome.doubts.iter().map(|doubt| doubt.text(names)).collect();
     if doubts.is_empty() && !outcome.is_better {
-        doubts.push(
-            "the new rig is no better on what it was not fitted to: keep the one that is there"
-                .to_owned(),
-        );
+        doubts.push("the new rig is not better on held-out joints: keep the old rig".to_owned());
     }
     verdict(&mut out, ("better", UNUSABLE), &doubts);
     about_table(&mut out, about);
     put!(
         out,
-        "<p class=\"note\">{} instants. Held out, joints are {} px from where the other cameras see them before and {} px after; \
-         {} of {} blocks became better, {} standard errors of the mean.</p>\n",
+        "<p class=\"note\">{} instants. The distance of held-out joints from where the other cameras see them is {} px with the old \
+         rig, and {} px with the new rig; {} of {} blocks improved ({} standard errors of the mean).</p>\n",
         outcome.n_instants,
         number(outcome.held_out_px[0], 2),
         number(outcome.held_out_px[1], 2),
@@ -311,7 +308,7 @@ mod tests {
             &[("one <at> 1 s".to_owned(), vec![1, 2, 3])],
         );
         assert!(
-            page.contains("usable, but not known well") && page.contains("one sees a person"),
+            page.contains("usable, but uncertain") && page.contains("one sees a person"),
             "{page}"
         );
         assert!(

@@ -79,6 +79,6 @@ fn the_calibration_page_shows_results_and_warnings() {
     testkit::chromium::check_in_browser(&good);
     let doubt = Doubt::FewBoards { camera: 0, n: 2 };
     let bad = page(&outcome(vec![doubt]), &["mirrored".to_owned()]);
-    assert!(bad.contains("not to be trusted") && bad.contains("in only 2 pictures"));
+    assert!(bad.contains("doubtful") && bad.contains("in only 2 pictures"));
     assert!(bad.contains("mirrored"));
 }
