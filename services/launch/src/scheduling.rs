@@ -114,7 +114,7 @@ mod tests {
         assert!(priority.contains("ulimit -r"), "{priority}");
         assert!(
             cores.starts_with(
-                "pose-1: cannot run on cores 1,7: 0,1 may be used; continuing without this setting"
+                "pose-1: cannot run on cores 1,7: only 0,1 may be used; continuing without this setting"
             ),
             "{cores}"
         );

@@ -269,7 +269,7 @@ mod long {
 
     #[test]
     #[ignore = "takes long"]
-    fn a_process_whose_model_is_missing_at_its_restart_is_abandoned_and_the_run_continues() {
+    fn a_process_whose_model_is_missing_at_its_restart_is_given_up_and_the_run_continues() {
         let more = PACED.to_owned() + "[supervise]\nmax_restarts = 2\n";
         let case = Case::new("no-model", &[N_FRAMES as usize; 3], &more);
         let mut started = case.start(&["run", "deployment.toml", "--json"]);

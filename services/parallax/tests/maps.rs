@@ -254,7 +254,7 @@ fn two_swapped_cameras_are_detected() {
     let ended = run(&case, &[]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stdout);
     assert!(
-        ended.stderr.contains("c0") && ended.stderr.contains("exchanged"),
+        ended.stderr.contains("c0") && ended.stderr.contains("swapped"),
         "{}",
         ended.stderr
     );

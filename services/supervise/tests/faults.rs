@@ -59,7 +59,7 @@ fn state_of(run: &Run, process: &str) -> State {
 }
 
 #[test]
-fn a_process_is_stopped_after_all_its_senders_are_abandoned() {
+fn a_process_is_stopped_after_all_its_senders_are_given_up() {
     let mut case = Case::new(
         Delivery::Lossless,
         &[
@@ -314,7 +314,7 @@ fn a_process_that_has_worked_for_a_while_is_restarted_at_once() {
 }
 
 #[test]
-fn a_crashing_process_is_abandoned_after_increasing_pauses() {
+fn a_crashing_process_is_given_up_after_increasing_pauses() {
     let mut case = Case::new(Delivery::Realtime, &[("wreck", "panic", Role::Essential)]);
     case.plan.policy.max_restarts = 3;
     let run = case.run(|_, _| {});
@@ -370,7 +370,7 @@ fn a_run_continues_with_the_remaining_views() {
 }
 
 #[test]
-fn a_process_that_waits_for_an_abandoned_view_does_not_block_the_end() {
+fn a_process_that_waits_for_a_view_that_was_given_up_does_not_block_the_end() {
     let mut case = Case::new(
         Delivery::Realtime,
         &[

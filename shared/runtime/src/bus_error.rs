@@ -31,7 +31,7 @@ pub enum BusError {
     Namespace(#[from] NamespaceError),
     /// There is no room in memory for the queues of a process. The system would kill the process when it first writes to them.
     #[error(
-        "process {process:?} needs {} KB of shared memory for its queues, {} KB are free in /dev/shm",
+        "process {process:?} needs {} KB of shared memory for its queues, but only {} KB are free in /dev/shm",
         .needed_bytes / 1000, .free_bytes / 1000
     )]
     Full {

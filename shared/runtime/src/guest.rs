@@ -66,7 +66,7 @@ pub enum GuestError {
     },
     /// The messages of a topic have a different version from the one that this program reads.
     #[error(
-        "deployment {name:?} sends {topic:?} version {theirs}, this program reads version {ours}"
+        "deployment {name:?} sends {topic:?} version {theirs}, but this program reads version {ours}"
     )]
     Version {
         /// Name of the deployment.

@@ -44,7 +44,7 @@ pub enum LockError {
         pid: String,
     },
     /// The supervisor of the deployment is dead, but some of its processes are still alive.
-    #[error("processes of an earlier run of deployment {name:?} are still there: {processes}")]
+    #[error("processes of an earlier run of deployment {name:?} still exist: {processes}")]
     StillAlive {
         /// Name of the deployment.
         name: String,

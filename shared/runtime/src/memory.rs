@@ -20,7 +20,7 @@ pub(crate) const SHARED_MEMORY: &str = "/dev/shm";
 pub enum MemoryError {
     /// The file system of shared memory is full.
     #[error(
-        "{path:?} needs {needed_bytes} bytes of shared memory, {free_bytes} are free in /dev/shm"
+        "{path:?} needs {needed_bytes} bytes of shared memory, but only {free_bytes} are free in /dev/shm"
     )]
     Full {
         /// File of the pool.
@@ -31,7 +31,9 @@ pub enum MemoryError {
         free_bytes: u64,
     },
     /// The pool exceeds the limit on the size of a file.
-    #[error("{path:?} needs {needed_bytes} bytes of shared memory, a file may have {limit_bytes}")]
+    #[error(
+        "{path:?} needs {needed_bytes} bytes of shared memory, but a file may have at most {limit_bytes}"
+    )]
     Limited {
         /// File of the pool.
         path: PathBuf,

@@ -32,7 +32,7 @@ pub enum NamespaceError {
         name: String,
     },
     /// The path is too long for Unix sockets.
-    #[error("working directory {root:?} has {len} bytes, sockets below it allow {max}")]
+    #[error("working directory {root:?} has {len} bytes, but sockets below it allow only {max}")]
     RootTooLong {
         /// The directory.
         root: PathBuf,

@@ -61,7 +61,9 @@ impl Fault for ObserverError {
     fn hint(&self) -> Option<String> {
         match self {
             Self::NotRunning { .. } => Some("`parallax status` shows what runs".to_owned()),
-            Self::Port(_) => Some("at most four may look at a deployment at a time".to_owned()),
+            Self::Port(_) => {
+                Some("at most four programs may watch a deployment at the same time".to_owned())
+            }
             Self::Bus(_) | Self::List { .. } | Self::Receive(_) | Self::Stop(_) => None,
         }
     }

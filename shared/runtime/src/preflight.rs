@@ -24,7 +24,7 @@ const STACK: u64 = 1 << 20;
 pub enum PreflightError {
     /// The pools do not fit into shared memory.
     #[error(
-        "deployment needs {} MB of shared memory, {} MB are free in /dev/shm; largest: {largest}",
+        "deployment needs {} MB of shared memory, but only {} MB are free in /dev/shm; largest: {largest}",
         .needed_bytes.div_ceil(1_000_000), .free_bytes / 1_000_000
     )]
     TooLarge {
@@ -36,7 +36,9 @@ pub enum PreflightError {
         largest: String,
     },
     /// A process needs more open files than its limit allows.
-    #[error("deployment needs {needed} open files in one process, the limit is {limit} open files")]
+    #[error(
+        "deployment needs {needed} open files in one process, but the limit is {limit} open files"
+    )]
     Descriptors {
         /// Number of open files of the process that needs the most.
         needed: u64,
@@ -201,7 +203,7 @@ mod tests {
         check_descriptors(10, 110).unwrap();
         let error = check_descriptors(10, 109).unwrap_err();
         let expected =
-            "deployment needs 110 open files in one process, the limit is 109 open files";
+            "deployment needs 110 open files in one process, but the limit is 109 open files";
         assert_eq!(error.to_string(), expected);
         assert!(error.hint().unwrap().contains("ulimit -n 110"));
     }

@@ -33,7 +33,7 @@ const MARK_FILE: &str = "parallax-deployment";
 #[derive(Debug, thiserror::Error)]
 pub enum PrivacyError {
     /// The file or directory belongs to another user.
-    #[error("{path:?} belongs to {owner}, this process runs as {user}")]
+    #[error("{path:?} belongs to {owner}, but this process runs as {user}")]
     Foreign {
         /// The file or directory.
         path: PathBuf,
@@ -102,7 +102,7 @@ impl PrivacyError {
                 failure::wording::shell(path.display())
             )),
             Self::Open { path, .. } => Some(format!(
-                "close it to other users: `sudo chmod go-w {}`",
+                "remove the write permission of other users: `sudo chmod go-w {}`",
                 failure::wording::shell(path.display())
             )),
             Self::Unmarked { path, .. } => Some(format!(

@@ -19,7 +19,7 @@ pub(crate) fn no_room() -> Option<String> {
     let kilobytes = |bytes: u64| bytes.div_ceil(1000);
     Some(match refused()? {
         Refused::NoRoom { wanted_bytes } => format!(
-            "{} KB of shared memory were needed, {} KB are free in /dev/shm: {ROOM}",
+            "{} KB of shared memory were needed, but only {} KB are free in /dev/shm: {ROOM}",
             kilobytes(wanted_bytes),
             free_shared_memory().unwrap_or(0) / 1000
         ),

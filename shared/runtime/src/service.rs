@@ -81,7 +81,7 @@ pub enum PortError {
         source: EventOpenError,
     },
     /// The publisher cannot be created.
-    #[error("cannot make a publisher of topic {topic:?}")]
+    #[error("cannot create a publisher of topic {topic:?}")]
     Publisher {
         /// Name of the topic.
         topic: String,
@@ -90,7 +90,7 @@ pub enum PortError {
         source: PublisherCreateError,
     },
     /// The subscriber cannot be created.
-    #[error("cannot make a subscriber of topic {topic:?}")]
+    #[error("cannot create a subscriber of topic {topic:?}")]
     Subscriber {
         /// Name of the topic.
         topic: String,
@@ -99,7 +99,7 @@ pub enum PortError {
         source: SubscriberCreateError,
     },
     /// The notifier cannot be created.
-    #[error("cannot make a notifier of topic {topic:?}")]
+    #[error("cannot create a notifier of topic {topic:?}")]
     Notifier {
         /// Name of the topic.
         topic: String,
@@ -108,7 +108,7 @@ pub enum PortError {
         source: NotifierCreateError,
     },
     /// The listener cannot be created.
-    #[error("cannot make a listener of topic {topic:?}")]
+    #[error("cannot create a listener of topic {topic:?}")]
     Listener {
         /// Name of the topic.
         topic: String,

@@ -187,7 +187,7 @@ fn an_earlier_subscriber_counts_once_it_is_connected() {
 }
 
 #[test]
-fn an_abandoned_receiver_is_waited_for_only_as_long_as_after_losses() {
+fn a_receiver_that_was_given_up_is_waited_for_only_as_long_as_after_losses() {
     let deployment = Deployment::new(&[small(Delivery::Lossless, 2)]);
     let sender = deployment.bus("sender");
     let publisher = sender.publisher::<ViewQuality>("small").unwrap();

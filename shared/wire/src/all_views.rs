@@ -259,7 +259,7 @@ mod tests {
         let got = change(|pairs| pairs[1].views = [1, 2]);
         assert_eq!(got, "first view is 1, expected 0");
         let got = change(|pairs| pairs[1].views = [0, 1]);
-        assert_eq!(got, "view before of entry 1 is 1, the limit is 1");
+        assert_eq!(got, "view before of entry 1 is 1, but the limit is 1");
         let got = change(|pairs| pairs[1].hypotheses.clear());
         assert_eq!(got, "n_hypotheses is 0, expected 1");
         let got = change(|pairs| pairs[1].hypotheses[0].energy = 3.0);

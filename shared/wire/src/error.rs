@@ -6,7 +6,7 @@ use messages::Refusal;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum WireError {
     /// A count is larger than the array that it counts.
-    #[error("{field} is {got}, the limit is {limit}")]
+    #[error("{field} is {got}, but the limit is {limit}")]
     TooMany {
         /// Name of the count.
         field: &'static str,
@@ -26,7 +26,7 @@ pub enum WireError {
         expected: usize,
     },
     /// An index is out of range.
-    #[error("{field} of entry {entry} is {got}, the limit is {limit}")]
+    #[error("{field} of entry {entry} is {got}, but the limit is {limit}")]
     OutOfRange {
         /// Name of the index.
         field: &'static str,
@@ -76,7 +76,7 @@ pub enum WireError {
         ahead_nanos: u64,
     },
     /// The frame number is too large.
-    #[error("{field} is {got}, the limit is {limit}")]
+    #[error("{field} is {got}, but the limit is {limit}")]
     Frame {
         /// Name of the number.
         field: &'static str,

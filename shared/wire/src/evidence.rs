@@ -280,7 +280,7 @@ mod tests {
         let before = refused(|header| header.scope_levels[0] = 2);
         assert_eq!(before, "levels of entry 0 is 1, expected ascending levels");
         let after = refused(|header| header.scope_levels[1] = 1);
-        assert_eq!(after, "levels of entry 0 is 1, the limit is 1");
+        assert_eq!(after, "levels of entry 0 is 1, but the limit is 1");
     }
 
     #[test]

@@ -215,7 +215,7 @@ mod tests {
         message.status = Status::OK;
         message.views = [1, 1];
         let got = pair_from_message(&message, &plans()).unwrap_err();
-        assert_eq!(got.to_string(), "views of entry 0 is 1, the limit is 1");
+        assert_eq!(got.to_string(), "views of entry 0 is 1, but the limit is 1");
     }
 
     #[test]

@@ -136,7 +136,10 @@ mod tests {
         let got = refused(|message| message.people[1].id = 3);
         assert_eq!(got, "people of an identity is 2, expected 1");
         let got = refused(|message| message.people[0].candidates[3] = 0);
-        assert_eq!(got, "view of a candidate of entry 0 is 3, the limit is 3");
+        assert_eq!(
+            got,
+            "view of a candidate of entry 0 is 3, but the limit is 3"
+        );
         let ninth = FramePeople {
             people: vec![person(1, &[Some(8)])],
             n_seen: 1,

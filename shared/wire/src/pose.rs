@@ -369,7 +369,7 @@ mod tests {
         let error = local_from_message(&message, 3).unwrap_err().to_string();
         assert_eq!(error, "local of entry 1 is NaN, expected a finite number");
         let error = local_from_message(&message, MAX_PARTS + 1).unwrap_err();
-        assert_eq!(error.to_string(), "local is 33, the limit is 32");
+        assert_eq!(error.to_string(), "local is 33, but the limit is 32");
     }
 
     fn sent() -> PoseMessage {

@@ -369,7 +369,7 @@ mod tests {
         got = one(&skeleton());
         got.n_people = 9;
         let error = check_skeletons(&got, 2, 3).unwrap_err();
-        assert_eq!(error.to_string(), "n_people is 9, the limit is 8");
+        assert_eq!(error.to_string(), "n_people is 9, but the limit is 8");
         let skeleton = skeleton();
         let nine = vec![person(1, &skeleton); 9];
         assert_eq!(skeletons_to_message(&nine, 0, 0).unwrap_err(), error);

@@ -151,7 +151,7 @@ fn show(plan: &Plan) -> Result<ExitCode, Failure> {
     let free = free_shared_memory().or_fail(ExitKind::Run)?;
     let mb = |bytes: u64| bytes as f64 / 1e6;
     output::line(format_args!(
-        "shared memory: {:.0} MB are needed, {:.0} MB are free in /dev/shm; the largest topics:",
+        "shared memory: {:.0} MB are needed, and {:.0} MB are free in /dev/shm; the largest topics:",
         mb(total),
         mb(free)
     ))?;

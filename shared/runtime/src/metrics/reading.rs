@@ -9,13 +9,13 @@ use messages::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ReadingError {
     /// There are more rows than a message can hold.
-    #[error("{rows} rows, a message has room for {MAX_ROWS}")]
+    #[error("{rows} rows, but a message has room for {MAX_ROWS}")]
     TooManyRows {
         /// Number of rows in the message.
         rows: u32,
     },
     /// A row has a stage that does not exist.
-    #[error("row {row} is of unknown stage {span}")]
+    #[error("row {row} has the unknown stage {span}")]
     UnknownSpan {
         /// Index of the row.
         row: usize,
@@ -37,7 +37,7 @@ pub enum ReadingError {
         count: u64,
     },
     /// Two rows have the same stage and view.
-    #[error("rows {first} and {second} are of the same stage and view")]
+    #[error("rows {first} and {second} have the same stage and view")]
     Twice {
         /// Index of the first row.
         first: usize,
@@ -427,7 +427,7 @@ mod tests {
         let rows = MAX_ROWS as u32 + 1;
         let error = refused(|message| message.n_rows = rows);
         assert_eq!(error, ReadingError::TooManyRows { rows });
-        assert_eq!(error.to_string(), "25 rows, a message has room for 24");
+        assert_eq!(error.to_string(), "25 rows, but a message has room for 24");
     }
 
     #[test]

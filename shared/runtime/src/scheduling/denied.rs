@@ -9,7 +9,7 @@ use super::{Policy, RealTime, text};
 pub enum Denied {
     /// The process may not use all requested cores.
     #[error(
-        "cannot run on cores {}: {} may be used", text::list(.asked), text::list(.allowed)
+        "cannot run on cores {}: only {} may be used", text::list(.asked), text::list(.allowed)
     )]
     Cores {
         /// Requested cores.

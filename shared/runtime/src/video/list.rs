@@ -288,7 +288,7 @@ impl VideoDevice {
             id: control.id,
             value: value as i32,
         };
-        self.ask(raw::S_CTRL, "take the value of a control", &mut set)
+        self.ask(raw::S_CTRL, "accept the value of a control", &mut set)
     }
 }
 

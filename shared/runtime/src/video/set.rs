@@ -86,7 +86,10 @@ impl VideoDevice {
         } else {
             rates.join(", ")
         };
-        let wanted = format!("{rate} a second at {}x{} in {format}", size[0], size[1]);
+        let wanted = format!(
+            "{rate} pictures per second at {}x{} in {format}",
+            size[0], size[1]
+        );
         Err(self.not_offered("rate", wanted, offered))
     }
 

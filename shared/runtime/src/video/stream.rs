@@ -58,7 +58,7 @@ impl VideoDevice {
         };
         self.ask(
             raw::REQBUFS,
-            "give buffers (another program may use it)",
+            "provide buffers (another program may be using it)",
             &mut request,
         )?;
         let mut stream = VideoStream {
@@ -91,12 +91,12 @@ impl VideoStream {
 
     fn map(&self, index: u32) -> Result<Mapping, VideoError> {
         let mut buffer = empty(index);
-        let what = "tell where its buffers are";
+        let what = "report the positions of its buffers";
         self.device.ask(raw::QUERYBUF, what, &mut buffer)?;
         let mapped = Mapping::new(&self.device, buffer.offset, buffer.length as usize);
         mapped.map_err(|source| VideoError::Request {
             path: self.device.path().to_owned(),
-            what: "let its buffers be mapped",
+            what: "allow its buffers to be mapped",
             source,
         })
     }
