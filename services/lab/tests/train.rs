@@ -227,7 +227,7 @@ fn an_interrupted_training_prints_how_to_continue_and_refuses_checkpoints_of_oth
     let again = drawn.train("m.fmp", &[]).wait();
     assert_ended(&again, 2, &["an earlier training was interrupted"]);
     let other = drawn.train("m.fmp", &["--resume", "--seed", "9"]).wait();
-    assert_ended(&other, 4, &["of another training", "delete"]);
+    assert_ended(&other, 4, &["belongs to another training", "delete"]);
     let rows = drawn.train("m.fmp", &["--resume", "--only", "1-13"]).wait();
     assert_ended(&rows, 4, &["other image files"]);
     for damage in [&checkpoint[..checkpoint.len() - 1], b"PLXMODEL", b""] {

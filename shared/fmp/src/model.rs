@@ -139,7 +139,7 @@ pub enum ModelError {
         max: usize,
     },
     /// A type of the parent excludes all types of the child, so no pose can contain it.
-    #[error("no type of part {part} goes with type {parent_type} of its parent")]
+    #[error("no type of part {part} is compatible with type {parent_type} of its parent")]
     DeadEnd {
         /// The part in question, counted from 1.
         part: usize,

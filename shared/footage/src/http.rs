@@ -27,11 +27,11 @@ impl Answer {
                     .to_owned()
             }
             Self::Other(kind) if kind == "text/html" => {
-                "a page came (text/html) instead of pictures: does the camera require a login (write the name and the \
+                "the answer is a web page (text/html) instead of pictures: does the camera require a login (write the name and the \
                  password before the host, followed by @), or is this the address of its menu?"
                     .to_owned()
             }
-            Self::Other(kind) => format!("{kind} came instead of pictures"),
+            Self::Other(kind) => format!("the answer is {kind} instead of pictures"),
         }
     }
 }

@@ -95,7 +95,7 @@ impl RemadeStream {
             return Ok(None);
         }
         let time = self.log.next_time();
-        let time = time.ok_or_else(|| failed("the decoder tells no times".to_owned()))?;
+        let time = time.ok_or_else(|| failed("the decoder gives no times".to_owned()))?;
         if time.bytes != (self.size.width * (self.size.height / SHARE)) as u64 {
             return Err(FootageError::SizeChanged {
                 path: self.name.clone().into(),

@@ -389,7 +389,7 @@ impl LiveStream {
             return Err(failed(&self.shown, &message));
         }
         let Some(time) = self.log.next_time() else {
-            return Err(failed(&self.shown, "the decoder tells no times"));
+            return Err(failed(&self.shown, "the decoder gives no times"));
         };
         let rows = self.size.height / SHARE;
         if time.bytes != (self.size.width * rows) as u64 {

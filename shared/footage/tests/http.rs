@@ -94,7 +94,7 @@ fn the_error_describes_an_answer_that_is_not_a_stream() {
         to.write_all(jpeg)
     });
     for (address, due) in [
-        (page, "a page came (text/html)"),
+        (page, "the answer is a web page (text/html)"),
         (single, "a single picture"),
     ] {
         let error = StreamSpec::new(address).probe().unwrap_err().to_string();

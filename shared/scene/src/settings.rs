@@ -238,7 +238,7 @@ impl Address {
             "rate" => {
                 let rate: Option<f64> = value.parse().ok();
                 let rate = rate.filter(|rate| (0.1..=1000.0).contains(rate));
-                settings.rate_hz = rate.ok_or_else(|| wrong("0.1 to 1000 frames a second"))?;
+                settings.rate_hz = rate.ok_or_else(|| wrong("0.1 to 1000 frames per second"))?;
             }
             _ => {
                 let flaw = settings.flaws.by_name_mut(key);
@@ -313,7 +313,7 @@ mod tests {
             ("synth://umpm?camera=l&others=5", "0 to 4"),
             ("synth://umpm?camera=l&action=flying", "walking, jogging"),
             ("synth://umpm?camera=l&seed=-1", "whole number"),
-            ("synth://umpm?camera=l&rate=0", "frames a second"),
+            ("synth://umpm?camera=l&rate=0", "frames per second"),
             ("synth://umpm?camera=l&noise=many", "a number"),
             ("synth://umpm?camera=l&drop=2", "flaw"),
             ("synth://umpm?camera=l&skew-ms=1,,2", "milliseconds"),

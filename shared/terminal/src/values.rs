@@ -37,7 +37,7 @@ pub fn outline(text: &str) -> Result<Outline, String> {
 pub fn rate(text: &str) -> Result<f64, String> {
     let rate: Option<f64> = text.parse().ok();
     let rate = rate.filter(|rate| (0.1..=1000.0).contains(rate));
-    rate.ok_or_else(|| "expected 0.1 to 1000 frames a second".to_owned())
+    rate.ok_or_else(|| "expected 0.1 to 1000 frames per second".to_owned())
 }
 
 #[cfg(test)]

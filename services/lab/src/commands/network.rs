@@ -295,9 +295,8 @@ fn given(card: &Card) -> String {
             further,
             ..
         } => format!(
-            "a map for every keypoint and {further} further maps; corner cells on corner pixels: {udp}; cells in the middle of \
-             their pixels: {centred}; maxima refined: {}; \
-             values: {}",
+            "a map for every keypoint and {further} further maps; centres of corner cells on centres of corner pixels (udp): {udp}; \
+             cells centred on the pixels that they cover: {centred}; maxima refined: {}; values: {}",
             word(&json!(refine)),
             word(&json!(score))
         ),

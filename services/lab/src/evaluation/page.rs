@@ -115,7 +115,7 @@ fn measures(out: &mut Html, group: &Group, titles: &[String]) {
         ("MPJPE after alignment, mm", |own| {
             (own.aligned_mpjpe_mm, None, 1)
         }),
-        ("left and right exchanged, %", |own| {
+        ("left and right swapped, %", |own| {
             (own.exchanged, own.exchanged_interval, 1)
         }),
         ("joints within 150 mm, %", |own| (own.pck3d, None, 1)),
@@ -171,7 +171,8 @@ fn predictions(out: &mut Html, summary: &Summary) {
     }
     put!(
         out,
-        "<h2>Expected errors</h2>\n<p><small>Views: evaluated views. Above: share in which the true error exceeds the threshold. \
+        "<h2>Expected errors</h2>\n<p><small>Views: evaluated views. Above: fraction of the parts whose true error exceeds the \
+         threshold. \
          Area: area under the ROC curve for predicting this from the expected error; 0.5 means no information. Correlation: Spearman's rank \
          correlation.</small></p>\n<div class=\"scroll\"><table>\n<tr><th>part<th>views<th>above, %<th>of \
          these switched off, %<th>of the others, %<th>area<th>correlation</tr>\n"

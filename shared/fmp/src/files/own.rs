@@ -137,17 +137,17 @@ mod tests {
         );
         assert_eq!(
             said_of(&bytes[..27]),
-            "the file has 27 bytes, its header says 28"
+            "the file has 27 bytes, but its header says 28"
         );
-        let expected = format!("the file has {} bytes, its header says {n}", n - 1);
+        let expected = format!("the file has {} bytes, but its header says {n}", n - 1);
         assert_eq!(said_of(&bytes[..n - 1]), expected);
         let longer = [&bytes[..], &[0]].concat();
-        let expected = format!("the file has {} bytes, its header says {n}", n + 1);
+        let expected = format!("the file has {} bytes, but its header says {n}", n + 1);
         assert_eq!(said_of(&longer), expected);
         bytes[n - 1] ^= 1;
         assert!(said_of(&bytes).starts_with("the file is damaged: its checksum is "));
         bytes[8] = 2;
-        let expected = "the file has version 2, this Parallax reads version 1";
+        let expected = "the file has version 2, but this Parallax reads version 1";
         assert_eq!(said_of(&bytes), expected);
     }
 

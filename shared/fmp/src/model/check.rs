@@ -458,7 +458,7 @@ mod tests {
         );
         assert_eq!(
             outcome(|model| edge(model, 1).bias[1] = vec![never, never]),
-            "no type of part 2 goes with type 2 of its parent"
+            "no type of part 2 is compatible with type 2 of its parent"
         );
     }
 

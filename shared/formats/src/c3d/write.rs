@@ -88,7 +88,9 @@ pub fn write(
     for points in frames {
         if points.len() != heading.labels.len() {
             let (got, due) = (points.len(), heading.labels.len());
-            return Err(refused(&format!("a frame of {got} points, {due} are due")));
+            return Err(refused(&format!(
+                "a frame has {got} points, but the heading announces {due}"
+            )));
         }
         for point in points {
             let bytes = numbers(point.as_ref(), heading.residual_step);
@@ -99,7 +101,9 @@ pub fn write(
     }
     if n_frames != heading.n_frames {
         let due = heading.n_frames;
-        return Err(refused(&format!("{n_frames} frames, {due} were announced")));
+        return Err(refused(&format!(
+            "{n_frames} frames were given, but the heading announces {due}"
+        )));
     }
     if heading.n_frames > u32::from(u16::MAX) {
         // The last block is not filled up, because readers such as `ezc3d` would count the padding of long files as more frames.

@@ -39,7 +39,7 @@ pub enum EnvelopeError {
         expected: [u8; 8],
     },
     /// The file was written by a different version of Parallax.
-    #[error("the file has version {got}, this Parallax reads version {expected}")]
+    #[error("the file has version {got}, but this Parallax reads version {expected}")]
     Version {
         /// Version of the file.
         got: u32,
@@ -47,7 +47,7 @@ pub enum EnvelopeError {
         expected: u32,
     },
     /// The file is truncated, or something was appended.
-    #[error("the file has {got} bytes, its header says {expected}")]
+    #[error("the file has {got} bytes, but its header says {expected}")]
     Length {
         /// Actual number of bytes.
         got: u64,
@@ -55,7 +55,7 @@ pub enum EnvelopeError {
         expected: u64,
     },
     /// The file is damaged.
-    #[error("the file is damaged: its checksum is {got:016x}, its header says {expected:016x}")]
+    #[error("the file is damaged: its checksum is {got:016x}, but its header says {expected:016x}")]
     Checksum {
         /// Checksum of the payload.
         got: u64,
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(refused(other), "the file does not begin with `PLXTRIAL`");
         assert_eq!(
             refused(older),
-            "the file has version 2, this Parallax reads version 3"
+            "the file has version 2, but this Parallax reads version 3"
         );
     }
 

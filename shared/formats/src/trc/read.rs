@@ -25,7 +25,7 @@ pub enum TrcError {
         expected: &'static str,
     },
     /// A row has a different number of columns than the header declares.
-    #[error("line {line}: {got} columns, the header announces {markers} markers")]
+    #[error("line {line}: {got} columns, but the header announces {markers} markers")]
     Columns {
         /// Number of the line, from 1.
         line: usize,

@@ -36,7 +36,10 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFewBones { bones, needed } => {
-                write!(f, "only {bones} bones are possible, {needed} are needed")
+                write!(
+                    f,
+                    "only {bones} bones are possible, but {needed} are needed"
+                )
             }
             Self::Stature { metres, limits } => {
                 let [low, high] = limits;

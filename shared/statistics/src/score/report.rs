@@ -127,7 +127,10 @@ impl fmt::Display for Report {
     /// Writes a table of percentages, with one line for each rule of PCP and each threshold of PCK.
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (n_images, n_missed) = (self.n_images, self.n_missed);
-        write!(out, "{n_images} images, nothing found on {n_missed}")?;
+        write!(
+            out,
+            "{n_images} images, {n_missed} of them without a detection"
+        )?;
         write!(out, "\n{:<18}", "PCP, %")?;
         for (name, _) in COLUMNS {
             write!(out, " {name:>8}")?;
@@ -200,7 +203,7 @@ mod tests {
     fn the_table_has_a_row_for_every_rule_and_fraction() {
         let truth = person();
         let expected = "\
-1 images, nothing found on 0
+1 images, 0 of them without a detection
 PCP, %                torso    u.leg    l.leg    u.arm    l.arm     head    total
 mean of ends          100.0    100.0    100.0    100.0    100.0    100.0    100.0
 both ends             100.0    100.0    100.0    100.0    100.0    100.0    100.0

@@ -29,7 +29,7 @@ pub enum SelectError {
         source: io::Error,
     },
     /// A range ends before it begins, or begins at 0.
-    #[error("there are no rows {first}-{last}: rows count from 1")]
+    #[error("there are no rows {first}-{last}: rows are counted from 1")]
     BadRange {
         /// First row of the range.
         first: usize,

@@ -24,7 +24,9 @@ pub enum BeginError {
         expected: Vec<usize>,
     },
     /// A layer has unexpected dimensions.
-    #[error("its {name} has the dimensions {got:?}, the network in the settings has {expected:?}")]
+    #[error(
+        "its {name} has the dimensions {got:?}, but the network in the settings has {expected:?}"
+    )]
     Size {
         /// Name of the layer, with the role of its values.
         name: String,

@@ -146,7 +146,7 @@ pub enum TrainError {
     Checkpoint(#[from] StoreError),
     /// The checkpoint belongs to a different training run.
     #[error(
-        "the checkpoint is of a training with other {learned_from} or settings, or from another network"
+        "the checkpoint belongs to a training with other {learned_from} or settings, or from another network"
     )]
     Other {
         /// Name of the samples, such as `people`.

@@ -32,7 +32,7 @@ pub struct Checkpoint {
 pub enum CheckpointError {
     /// The checkpoint belongs to a different training run.
     #[error(
-        "the checkpoint is of another training: people, images without people or settings have changed"
+        "the checkpoint belongs to another training: people, images without people or settings have changed"
     )]
     Other,
     /// The checkpoint is damaged.
@@ -98,13 +98,13 @@ impl<'a> Trainer<'a> {
     fn fits(&self, it: &Checkpoint) -> Result<(), CheckpointError> {
         let damaged = |what| Err(CheckpointError::Damaged { what });
         if it.n_done > self.steps.len() {
-            return damaged("more steps are done than there are");
+            return damaged("more steps are done than the plan has");
         }
         if !it.threshold.is_finite() || !it.v.iter().all(|value| value.is_finite()) {
             return damaged("a number is not finite");
         }
         if it.v.len() != self.v.len() || it.right.len() != self.right.len() {
-            return damaged("a list has another length");
+            return damaged("a list has the wrong length");
         }
         let poses = it.right.iter().flatten();
         let poses = poses.chain(it.examples.iter().map(|example| example.0.pose()));
@@ -122,7 +122,7 @@ impl<'a> Trainer<'a> {
             .iter()
             .all(|example| known(&example.0) && example.1 >= 0.0 && example.1.is_finite())
         {
-            return damaged("an example is of a person or an image that is not there");
+            return damaged("an example names a person or an image that does not exist");
         }
         Ok(())
     }

@@ -90,7 +90,7 @@ fn summary(learned: &Learned) -> serde_json::Value {
 
 fn text(learned: &Learned) -> String {
     let it = &learned.file.learned;
-    let mut lines = vec!["reach  ridge   error on people left out, % of their size".to_owned()];
+    let mut lines = vec!["reach  ridge   error on held-out people, % of their size".to_owned()];
     for (tried, errors) in &learned.tried {
         let errors: Vec<String> = errors.iter().map(|error| format!("{error:.3}")).collect();
         let is_taken = tried.reach == it.reach && tried.ridge == it.ridge;
@@ -103,7 +103,7 @@ fn text(learned: &Learned) -> String {
     }
     for set in &it.sets {
         lines.push(format!(
-            "{}: {} of {} people found; error on people left out: {:.3} before, {:.3} after",
+            "{}: {} of {} people found; error on held-out people: {:.3} before, {:.3} after",
             set.name, set.found, set.people, set.error_before, set.error_after
         ));
     }

@@ -86,9 +86,15 @@ fn names_beyond_the_limits_are_cut_or_continued_or_refused() {
 fn an_unannounced_number_of_points_or_frames_is_refused() {
     let labels = names(2);
     let error = write(&mut Vec::new(), &heading(&labels, 2), [vec![None, None]]).unwrap_err();
-    assert!(error.to_string().contains("1 frames, 2"), "{error}");
+    assert!(
+        error.to_string().contains("1 frames were given, but the heading announces 2"),
+        "{error}"
+    );
     let error = write(&mut Vec::new(), &heading(&labels, 1), [vec![None]]).unwrap_err();
-    assert!(error.to_string().contains("1 points, 2"), "{error}");
+    assert!(
+        error.to_string().contains("1 points, but the heading announces 2"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn truth(
         .ok_or_else(|| invalid(file, 0, format!("no joint set {:?}", truth.joints)))?;
     if truth.markers.len() != set.joints.len() {
         let (got, expected) = (truth.markers.len(), set.joints.len());
-        let what = format!("{got} markers, {} has {expected} joints", set.name);
+        let what = format!("{got} markers, but {} has {expected} joints", set.name);
         return Err(invalid(file, 0, what));
     }
     let path = folder.join(&truth.trc);

@@ -44,7 +44,7 @@ pub(super) fn check(path: &Path, motion: &Motion) -> Result<(), MotionError> {
     let fold: f64 = all().map(fold).sum();
     if fold < 0.0 {
         return refuse(
-            "knees would fold forward: left and right are exchanged, or the axes are mirrored"
+            "knees would fold forward: left and right are swapped, or the axes are mirrored"
                 .to_owned(),
         );
     }

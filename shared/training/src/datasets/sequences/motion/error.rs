@@ -39,7 +39,7 @@ pub enum MotionError {
         source: TrcError,
     },
     /// The frame rate is out of range.
-    #[error("{}: {rate_hz} frames a second", .path.display())]
+    #[error("{}: {rate_hz} frames per second", .path.display())]
     Rate {
         /// The file.
         path: PathBuf,

@@ -242,7 +242,7 @@ fn impossible_motion_is_refused_with_a_likely_cause() {
     assert!(got.contains("is the unit wrong?"), "{got}");
     let sides = own_table("").replace("[\"left", "[\"L").replace("[\"right", "[\"left");
     let got = by(&sides.replace("[\"L", "[\"right"));
-    assert!(got.contains("left and right are exchanged"), "{got}");
+    assert!(got.contains("left and right are swapped"), "{got}");
     // The same motion upside down.
     let text = trc(20, false, |_, _| false);
     let upside_down: String = text
@@ -273,7 +273,7 @@ fn files_that_cannot_be_used_are_refused() {
         "{got}"
     );
     let got = refused(read("a.trc", text.replace("\n50\t", "\n0\t"), &options));
-    assert_eq!(got, "trc: 0 frames a second");
+    assert_eq!(got, "trc: 0 frames per second");
     let got = refused(read("a.trc", text.replace("\tm\n", "\tmiles\n"), &options));
     assert!(got.contains("unit \"miles\" is not known"), "{got}");
     let beyond = MotionOptions {
