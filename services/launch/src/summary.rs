@@ -372,7 +372,7 @@ impl Report {
 
     /// Writes the report of a host with cameras, which does not have the results.
     fn write_far(&self, text: &mut String) -> core::fmt::Result {
-        writeln!(text, "  results       on the host that fuses")?;
+        writeln!(text, "  results       on the fusing host")?;
         self.write_live(text);
         self.write_memory(text)
     }
@@ -414,7 +414,8 @@ impl Report {
             let px = |value: Option<f64>| value.unwrap_or(f64::NAN);
             writeln!(
                 text,
-                "  calibration   {camera} is not where it says: the cameras differ by {:.0} px with this camera, and by {:.0} px without it",
+                "  calibration   {camera} is not where the rig says: the \
+                 cameras differ by {:.0} px with this camera, and by {:.0} px without it",
                 px(fit.residual_px),
                 px(fit.without_px),
             )?;

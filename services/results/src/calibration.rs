@@ -116,8 +116,8 @@ impl Calibration {
         };
         let cameras = it.views.map(|view| scene.views[view].name.clone());
         tracing::warn!(
-            "the footage of {} and {} seems to be exchanged: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
-             degrees if the footage of the two is exchanged{}",
+            "the footage of {} and {} seems to be swapped: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
+             degrees if the footage of the two is swapped{}",
             cameras[0],
             cameras[1],
             it.degrees,
@@ -125,7 +125,7 @@ impl Calibration {
             if it.is_sure {
                 ""
             } else {
-                "; perhaps two other cameras are exchanged instead"
+                "; perhaps two other cameras are swapped instead"
             },
         );
         self.exchanged = Some(Exchanged {

@@ -133,7 +133,7 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
     if tag.swaps_sides() && is_wide(turned) != is_wide(stored) && width != height {
         let does_turn = is_wide(turned) == (width > height);
         let pixels = if does_turn { turned } else { stored };
-        let how = if does_turn { "turned" } else { "as stored" };
+        let how = if does_turn { "rotated" } else { "as stored" };
         let why = format!(
             "the calibration is for {width}x{height} pixels, and the pictures have {pixels} {how}"
         );

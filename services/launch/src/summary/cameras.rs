@@ -9,8 +9,8 @@ use supervise::Outcome;
 pub(super) fn exchanged(exchanged: &Exchanged) -> String {
     let [first, second] = &exchanged.cameras;
     format!(
-        "  calibration   {first} and {second} look exchanged: rays miss each other by {:.1} degrees, but only by {:.1} if the footage of \
-         the two is exchanged{}; exchange their `source` in the deployment\n",
+        "  calibration   {first} and {second} look swapped: rays miss each other by {:.1} degrees, but only by {:.1} if the footage of \
+         the two is swapped{}; swap their `source` in the deployment\n",
         exchanged.degrees,
         exchanged.exchanged_degrees,
         if exchanged.sure {
@@ -24,7 +24,7 @@ pub(super) fn exchanged(exchanged: &Exchanged) -> String {
 /// Returns the text about cameras whose views contradict each other.
 pub(super) fn contradicted(contradicted: &Contradicted) -> String {
     let likely = contradicted.likely.as_ref().map_or_else(String::new, |[first, second]| {
-        format!(" ({first} and {second} exchanged would fit best)")
+        format!(" (swapping {first} and {second} would fit best)")
     });
     format!(
         "  calibration   the cameras contradict each other: rays to the same part miss each other by {:.1} degrees, where up \
@@ -141,8 +141,8 @@ fn unlike_times(cameras: &[(String, CameraCounts)]) -> Option<String> {
         String::new()
     };
     Some(format!(
-        "  clock         the times of {} are capture times, but the times of {} are arrival times: later by the time \
-         that a picture is under way{remedy}\n",
+        "  clock         the times of {} are capture times, but the times of {} are arrival times, which are later by the delay of the \
+         pictures{remedy}\n",
         told.join(", "),
         late.join(", "),
     ))

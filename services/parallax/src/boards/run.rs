@@ -111,7 +111,7 @@ pub fn calibrate(
         for (name, seen) in task.names.iter().zip(&looked.cameras) {
             if 2 * seen.n_inverted > seen.sights.len() {
                 notes.push(format!(
-                    "{name}: black and white are exchanged in the pictures"
+                    "{name}: black and white are swapped in the pictures"
                 ));
             }
         }
@@ -228,7 +228,7 @@ fn mirrored(
     turned(&mut task.board);
     task.sights.iter_mut().for_each(|sight| turned(&mut sight.on_board));
     notes.push(
-        "all footage is mirrored: this rig exchanges left and right in its results".to_owned(),
+        "all footage is mirrored: results with this rig have left and right swapped".to_owned(),
     );
     Ok(Mirrored::Known)
 }

@@ -262,7 +262,7 @@ impl Worded<'_> {
             } => write!(
                 f,
                 "{}: its joints are {percent:.1} % of a person's size away from the prediction of the other cameras (median), but the \
-                 limit is {most:.1} %: cameras were exchanged or moved, or they show different scenes",
+                 limit is {most:.1} %: cameras were swapped or moved, or they show different scenes",
                 name(camera)
             ),
             _ => self.contradiction(f),

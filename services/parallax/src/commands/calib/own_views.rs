@@ -75,11 +75,11 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
         let sure = if swap.is_sure {
             ""
         } else {
-            "; perhaps two other cameras are exchanged instead"
+            "; perhaps two other cameras are swapped instead"
         };
         return vec![format!(
-            "the footage of {} and {} seems to be exchanged: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
-             degrees if the footage of the two is exchanged{sure}",
+            "the footage of {} and {} seems to be swapped: rays to the same part miss each other by {:.1} degrees, but only by {:.1} \
+             degrees if the footage of the two is swapped{sure}",
             name(swap.views[0]),
             name(swap.views[1]),
             swap.degrees,
@@ -88,7 +88,7 @@ fn disagreements(rig: &Rig, swaps: &SwapWatch, moved: &RigWatch) -> Vec<String> 
     }
     if let Some(found) = swaps.contradiction() {
         let likely = found.likely.map_or_else(String::new, |[a, b]| {
-            format!(" (exchanging {} and {} would fit best)", name(a), name(b))
+            format!(" (swapping {} and {} would fit best)", name(a), name(b))
         });
         return vec![format!(
             "the cameras contradict each other: rays to the same part miss each other by {:.1} degrees (normally at most {:.1} \
@@ -217,7 +217,7 @@ mod tests {
         std::fs::write(&file, seen(&rig, [0, 2, 1, 3])).unwrap();
         let wrong = agreement(&rig, &file).unwrap().disagreements.join("; ");
         assert!(
-            wrong.contains("the footage of c1 and c2 seems to be exchanged"),
+            wrong.contains("the footage of c1 and c2 seems to be swapped"),
             "{wrong}"
         );
     }

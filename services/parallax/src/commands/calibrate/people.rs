@@ -244,8 +244,8 @@ fn vertical(outcome: &Outcome) -> &'static str {
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     let [from, to] = outcome.span_s;
     output::line(format_args!(
-        "{} instants over {:.1} s; vertical from {}; scale known to within {:.1} %; height of the person from the bones {:.3} m; sides of \
-         {} views exchanged; clocks {}",
+        "{} instants over {:.1} s; vertical from {}; scale known to within {:.1} %; height of the person from the bones {:.3} m; sides \
+         of {} views swapped; clocks {}",
         outcome.n_instants,
         to - from,
         vertical(outcome),
