@@ -142,8 +142,8 @@ pub enum Pace {
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Capture")]
 pub struct Config {
-    /// Behaviour of a stage that is too slow: `lossless` drops nothing; `paced` does the same at the frame rate; `realtime` keeps only the
-    /// latest frame (always used with live cameras).
+    /// Behaviour of a stage that is too slow: `lossless` drops nothing; `paced` drops nothing either, but reads footage at its frame rate;
+    /// `realtime` keeps only the latest frame (always used with live cameras).
     pub mode: Mode,
     /// Size of the frames in the pipeline, `[width, height]` in pixels, instead of `scale`.
     pub size: Option<[usize; 2]>,

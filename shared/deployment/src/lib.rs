@@ -132,7 +132,7 @@ pub struct Supervision {
     pub hang_limit_s: Option<u64>,
     /// Number of heartbeats, sent every 150 ms, that a process may miss before it is killed.
     pub missed_beats: u32,
-    /// Maximum number of restarts of one process within a minute before the supervisor gives up.
+    /// Maximum number of restarts of one process within a minute; after that, the supervisor gives up the process.
     pub max_restarts: u32,
     /// Limit for the 99th percentile of the time from capture to result, in milliseconds; the run fails if it is exceeded.
     pub latency_budget_ms: Option<f64>,

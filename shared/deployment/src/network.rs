@@ -24,7 +24,7 @@ pub struct Config {
     pub least_heat: f64,
     /// Maximum number of people in a view, and in a frame.
     pub people: usize,
-    /// Mean number of runs of the network per frame and view, where people who are left out are predicted; by default, the network runs on
+    /// Mean number of runs of the network per frame and view; people on whom it does not run are predicted; by default, the network runs on
     /// everybody or, in `realtime` mode, as often as the cores manage.
     pub looks: Option<f64>,
     /// Average the results of each person's picture and its mirror image; this is more accurate, but takes twice as long.

@@ -32,7 +32,8 @@ pub struct Config {
     pub candidates: usize,
     /// Network that estimates the direction in which a person faces: a file from `parallax-lab train orientation`, `"shipped"` or `"none"`.
     pub orientation: PathBuf,
-    /// Views that are solved together: `pairs`, whose poses are then combined, as published; or `all`, for at most 8 views.
+    /// Views that are solved together: the two views of each pair, whose poses are then combined, as published (`pairs`); or all views, at
+    /// most 8 (`all`).
     pub views: Views,
     /// Names of the pairs of cameras to fuse; if empty, all pairs.
     pub pairs: Vec<[String; 2]>,
@@ -56,8 +57,8 @@ pub struct Config {
     /// Expected error above which a part is switched off: `none`, `learned`, the name of a data set, a list with a value in pixels for each
     /// part, or `{ file = FILE }`.
     pub tau: Tau,
-    /// View whose expected error switches a part off: `either` view, as published; the `support`; or the support if it is the `worse` of
-    /// the two.
+    /// View whose expected error can switch a part off: `either` view, as published; only the supporting view (`support`); or only the
+    /// supporting view, if its error is the larger one (`worse`).
     pub switch: Switch,
     /// Decide for every view whether the person is seen from behind.
     pub facing: bool,
