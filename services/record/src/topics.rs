@@ -80,7 +80,7 @@ impl Topics {
 /// evidence, and pictures are numbered.
 pub(crate) fn counted_by(counter: &Channel, channels: &[Channel]) -> Vec<usize> {
     let is_counted = |other: &Channel| match counter.kind {
-        // Pictures are numbered, so they count themselves.
+        // The numbers of the pictures show how many are missing.
         Kind::Picture => other.name == counter.name,
         Kind::Health => {
             let sender = other.sender.as_ref();

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "Person")]
 pub struct Config {
-    /// Which of several people is followed: `last`, the same person as in the previous frame; `largest` or `clearest`, chosen anew in every
-    /// frame.
+    /// Which of several people is followed: `last`, the same person as in the previous frame; `largest` or `clearest`, chosen again in
+    /// every frame.
     pub follow: Follow,
     /// Set of joints: `parse14`, `umpm15` or `humaneva20`.
     pub joints: String,

@@ -27,7 +27,7 @@ pub(super) fn text(
     })
 }
 
-/// Returns a line with the share of people whom the network did not have the time to look at; `None` if there are none.
+/// Returns a line with the fraction of people on whom the network did not run for lack of time; `None` if there are none.
 pub(super) fn predicted(summary: &Summary) -> Option<String> {
     let share = summary.sightings_predicted as f64 / summary.sightings.max(1) as f64;
     (share > 0.0).then(|| {

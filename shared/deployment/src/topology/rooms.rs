@@ -130,7 +130,7 @@ impl Topology {
         for worker in (0..self.n_workers).filter(|_| !self.has_maps) {
             let room = small(topic::pair_pose(worker), Content::PairPose, 1 + n_recorders);
             rooms.push(Room {
-                // If all views are solved at once, fusion sends its messages at the same time: one fewer than there are views.
+                // If all views are solved at once, fusion sends all its messages at the same time, one fewer than there are views.
                 queued: room.queued.max(views.len()),
                 ..room
             });

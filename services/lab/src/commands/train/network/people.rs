@@ -24,7 +24,7 @@ The direction in which a person faces is computed from the marks, if left and ri
 (LSP; for PARSE pass --sides PARSE=seen).
 
 A teacher is another network with a card. Its joints replace missing marks. If a teacher clearly contradicts the sides of a person, the \
-sides are exchanged. Where a teacher agrees with a mark, the mean of both is learned. The nose, heels and big toes come from the first \
+sides are swapped. Where a teacher agrees with a mark, the mean of both is learned. The nose, heels and big toes come from the first \
 teacher whose card has them; for several teachers, repeat --teacher and --teacher-card.
 
 One person in twelve is held out, to monitor the training and to learn the expected error. Use --without to leave out the people \
