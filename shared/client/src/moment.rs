@@ -11,7 +11,7 @@ use crate::lock::lock;
 /// Everything that was requested about one frame and is available.
 #[derive(Debug)]
 pub struct Moment {
-    /// The deployment's description of itself: names of joints and cameras.
+    /// Description that the deployment publishes: names of joints and cameras.
     pub running: Arc<Running>,
     /// Number of the frame, the same in all views.
     pub frame: u64,

@@ -157,7 +157,7 @@ impl Client {
         lock(&self.shared.inner).state
     }
 
-    /// Returns the deployment's description of itself: that of the last run, or `None` before the first run.
+    /// Returns the description that the deployment published in its last run; `None` before the first run.
     pub fn running(&self) -> Option<Arc<Running>> {
         lock(&self.shared.inner).running.clone()
     }

@@ -77,7 +77,8 @@ fn keypoint(
     }
     let share = f64::from(mean.views.count_ones()) / trial.views.len().max(1) as f64;
     let seen = view.see(&mean).filter(|seen| view.holds(seen.at))?;
-    // If the views of a joint are not known, the joint was found nevertheless; a fraction of zero would mean that it was not.
+    // If it is not known which views were used for a joint, the fraction is 0.01: a fraction of zero would mean that the joint was not
+    // found.
     Some((seen, share.clamp(0.01, 1.0)))
 }
 

@@ -59,7 +59,7 @@ impl PixelFormat {
     /// Brightness and colour are interpreted as BT.601 with values from 16 to 235, as used by webcams.
     ///
     /// * `bytes_per_row`: bytes from one row to the next; 0 for rows without a gap.
-    /// * `rgb`: `width * height * 3` bytes; undefined after `false`.
+    /// * `rgb`: `width * height * 3` bytes; the content is undefined if the function returns `false`.
     pub fn to_rgb(self, bytes: &[u8], bytes_per_row: usize, size: Size, rgb: &mut [u8]) -> bool {
         if rgb.len() != size.rgb_bytes() || size.rgb_bytes() == 0 {
             return false;

@@ -329,7 +329,7 @@ impl Clock {
         index.is_some()
     }
 
-    /// Advances by one frame if a frame was read, and returns `was_there`.
+    /// Advances by one frame if `was_there` is true, and returns `was_there`.
     fn tick(&mut self, was_there: bool) -> bool {
         if was_there {
             self.index = self.index.saturating_add(self.step);

@@ -9,7 +9,7 @@ use crate::{TypeTables, ViewInput};
 /// Part-type tables by the angle between two views, as seen from the person.
 ///
 /// The circle is divided into bins of equal width. Tables are given for one half; the other half has the same tables with the views
-/// exchanged. A pair of views uses the table of the bin that contains its angle.
+/// swapped. A pair of views uses the table of the bin that contains its angle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleTables {
     /// Tables by angle, starting at -180 degrees; `None` if there is no table.

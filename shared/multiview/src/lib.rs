@@ -21,8 +21,8 @@
 //! The benefit was measured with three person models; the results of pairs were averaged. Each cell shows PCP3D (in percent) / MPJPE (in
 //! mm). The first model confused left and right: for one sixth of the people in its training data, they were labelled the wrong way round.
 //! Its tables were made from 95 instants in front of rings of 3, 5, 6 and 8 cameras (walking, boxing, gestures, sitting, grabbing). The
-//! tables of the other two models were made from 900 instants in front of rings of 3 to 9 cameras; the third model is the one that ships.
-//! The test sets are:
+//! tables of the other two models were made from 900 instants in front of rings of 3 to 9 cameras; the third model is the included one. The
+//! test sets are:
 //!
 //! * A: 24 instants of other synthetic people who jog and throw, rendered for the three cameras of `HumanEva-I` at 320 x 240.
 //! * B: 30 instants of other synthetic people in five actions, rendered for the same cameras at 640 x 480.

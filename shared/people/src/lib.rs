@@ -88,7 +88,7 @@ pub enum State {
     New,
     /// Seen by enough views to be tracked.
     Tracked,
-    /// Seen by one view only, or too close to another person to tell the two apart.
+    /// Seen by only one view, or too close to another person to be distinguished.
     Unsure,
     /// Not seen in this frame; the joints are at their expected positions.
     Lost,

@@ -22,8 +22,8 @@ const LEAST_SEEN: usize = 5;
 const ONE_M: f64 = 0.3;
 /// Distance, in metres, that is added to the maximum distance for single detections if an unseen person is searched for.
 const TAKEN_UP_M: f64 = 0.25;
-/// Maximum distance, in metres, at which a new person can be a missed person; the next constant is the maximum mean difference of the
-/// logarithms of the bone lengths.
+/// Maximum distance, in metres, at which a new person is taken for a person who was lost; the next constant is the maximum mean difference
+/// of the logarithms of the bone lengths.
 const MISSED_M: f64 = 1.5;
 const OTHER_BONES: f64 = 0.15;
 /// A person is dropped after this time without being seen, in seconds.

@@ -1,7 +1,7 @@
 //! Limits how often the network runs in a view, so that the view keeps up with the frame rate.
 
-/// Share of the processor time of all cores that the networks of all views may take. The rest is for decoding pictures, for the people in
-/// 3D, and for pages.
+/// Share of the processor time of all cores that the networks of all views may take. The rest is for decoding pictures, for solving in 3D,
+/// and for pages in the browser.
 const SHARE: f64 = 0.6;
 /// Weight of a new measurement in the mean times.
 const NEW_COST: f64 = 0.05;

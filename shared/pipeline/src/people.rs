@@ -240,7 +240,7 @@ fn person<'a>(
     rays: &mut Vec<&'a Ray>,
 ) -> Option<Person> {
     let mut seen = placed(cameras, views, candidates, rays)?;
-    // Each added view moves the person, so more views may match then.
+    // Each added view changes the 3D position of the person, so further views may match afterwards.
     for _ in 0..MAX_ROUNDS {
         if seen.candidates == *candidates {
             return Some(seen);

@@ -40,7 +40,7 @@ impl EvidenceWindow {
 /// Settings of the single-view step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewSettings {
-    /// Levels provided as evidence.
+    /// Pyramid levels whose responses are provided as evidence.
     pub window: EvidenceWindow,
     /// Maximum number of candidates.
     pub n_candidates: usize,

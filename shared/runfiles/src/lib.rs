@@ -10,7 +10,7 @@
 //! | `latency.json` | [`LatencyReport`] | run |
 //! | `summary.json` | [`RunSummary`] | run; has the version of all files |
 //!
-//! [`Running`] is not a file of a run. It is the description that a running deployment gives of itself to other programs.
+//! [`Running`] is not a file of a run. It is the description that a running deployment publishes for other programs.
 //!
 //! This crate converts text to types and opens no file. A field that is missing, has an unknown type or is out of range is a
 //! [`ReadError`] that names the line and the field. Only fields that were added later may be missing. Unknown fields are ignored, so that

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// Description that a running deployment gives of itself: the entry [`Running::KEY`] of the file `deployment.json`
-/// beside its sockets.
+/// Description that a running deployment publishes: the entry [`Running::KEY`] of the file `deployment.json` beside its sockets.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Running {
     /// Version of this description, [`Running::VERSION`].

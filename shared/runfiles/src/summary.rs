@@ -82,7 +82,7 @@ pub struct Summary {
     pub searches: BTreeMap<String, BTreeMap<String, u64>>,
     /// Number of people that the views saw, added up over views and frames, since the last start of the process.
     pub sightings: u64,
-    /// Number of these sightings that were predicted, because the network did not have the time to run on everybody.
+    /// Number of these sightings that were predicted, because there was no time to run the network on everybody.
     pub sightings_predicted: u64,
     /// How far the results can be trusted, since the last start of the process.
     pub trust: Trust,

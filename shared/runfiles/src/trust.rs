@@ -105,7 +105,7 @@ impl Trust {
     pub const MIN_FRAMES: u64 = 12;
 
     /// Returns a number that ranks runs by their error, in metres: the geometric mean of [`disagreement_m`](Self::disagreement_m) and
-    /// [`bone_scatter_m`](Self::bone_scatter_m). The number is not an error itself. A limit of 0.02 m separates runs with many wrong limbs
+    /// [`bone_scatter_m`](Self::bone_scatter_m). The number alone is not an error. A limit of 0.02 m separates runs with many wrong limbs
     /// from other runs (docs/guide/run.md).
     pub fn expected_error_m(&self) -> Option<f64> {
         Some((self.disagreement_m? * self.bone_scatter_m?).sqrt())

@@ -245,8 +245,8 @@ impl<'a> Sender<'a> {
         })
     }
 
-    /// Sends until this process ends. The last messages are sent after the end, so that they contain the final counts. A new observer gets
-    /// metrics at once.
+    /// Sends messages until the work of this process has ended. The last messages are sent after that, so that they contain the final
+    /// counts. A new observer gets metrics at once.
     fn send_until_ended(&self) {
         let mut rates = Rates::new(self.counts.began_at_nanos);
         let (mut n_heartbeats, mut n_observers) = (0_u32, 0);

@@ -155,8 +155,8 @@ impl Namespace {
         self.root.join("config").join("iceoryx2.toml")
     }
 
-    /// Returns the description that the deployment writes of itself while it runs ([`crate::DeploymentLock::describe`]). If the
-    /// deployment is starting, use [`wait_for_description`](crate::wait_for_description).
+    /// Returns the description that the deployment publishes while it runs ([`crate::DeploymentLock::describe`]). If the deployment is
+    /// starting, use [`wait_for_description`](crate::wait_for_description).
     ///
     /// # Errors
     ///

@@ -198,7 +198,7 @@ pub fn give_way() {
 mod tests {
     use super::*;
 
-    /// Runs a function on a separate thread, because the scheduling of a thread stays changed.
+    /// Runs a function on a separate thread, because changes to the scheduling of a thread are not undone.
     fn on_a_thread<T: Send + 'static>(body: impl FnOnce() -> T + Send + 'static) -> T {
         let thread = thread::Builder::new().spawn(body).unwrap();
         thread.join().unwrap()

@@ -25,7 +25,7 @@ pub struct Recording {
 pub struct Posture {
     /// The joints of `skeleton::PARSE14`.
     pub joints: [[f64; 3]; N_JOINTS],
-    /// The toes of the right and of the left foot, if known; if unknown, the feet point as the shins determine.
+    /// The toes of the right and of the left foot, if known. If they are unknown, the direction of the feet is computed from the shins.
     pub toes: Option<[[f64; 3]; 2]>,
 }
 

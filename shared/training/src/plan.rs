@@ -18,7 +18,7 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// The parents, and the mirror if the model is to be symmetric.
+    /// Returns the parents, and the mirror if the settings require a symmetric model.
     fn sides(&self, settings: &Settings) -> (&[Option<usize>], Option<&[usize]>) {
         let mirror = self.mirror.as_deref().filter(|_| settings.symmetric);
         (&self.parents, mirror)

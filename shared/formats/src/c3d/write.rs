@@ -6,11 +6,11 @@ use crate::c3d::numbers::BLOCK;
 
 /// Maximum number of characters in the name or description of a point; one byte holds the length.
 const MAX_TEXT: usize = 127;
-/// Maximum number of names in one parameter; one byte holds the number.
+/// Maximum number of names in one parameter; the format stores this number in one byte.
 const MAX_TEXTS: usize = 255;
-/// Maximum number of blocks of parameters; one byte holds the number.
+/// Maximum number of blocks of parameters; the format stores this number in one byte.
 const MAX_BLOCKS: usize = 255;
-/// Maximum number of steps of a residual; one byte holds the number.
+/// Maximum residual, in steps; the format stores it in one byte.
 const MAX_RESIDUAL: f64 = 255.0;
 
 /// Header of a file, before its points; see [`write()`].

@@ -9,7 +9,7 @@ struct Taps {
     weights: Vec<f64>,
 }
 
-/// Taps of an area average from `from` to `to` samples.
+/// Returns the taps of an area average that reduces `from` samples to `to` samples.
 ///
 /// Output `d` covers the input interval `[d inv, (d + 1) inv)`, where `inv = from / to`. A partly covered sample has its covered share as
 /// weight; shares up to 1e-3 are dropped.

@@ -10,7 +10,7 @@ use rustix::fs::{FileType, Mode, OFlags, major, open, stat};
 use super::raw::{self, Raw, Request};
 use super::{FourCc, VideoError};
 
-/// A device's description of itself.
+/// Description that a device reports.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct VideoAbout {
     /// Name of the camera.
@@ -121,7 +121,7 @@ impl VideoDevice {
         Ok(capability)
     }
 
-    /// Returns the device's description of itself.
+    /// Returns the description that the device reports.
     ///
     /// # Errors
     ///

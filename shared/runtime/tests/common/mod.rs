@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use failure::Stop;
 use runtime::{Bus, DeploymentLock, Namespace, Topic, TopicPlan};
 
-/// The fields are dropped in this order: topics before the lock, which removes all files.
+/// The fields are dropped in this order: first the topics, then the lock, because dropping the lock removes all files.
 pub(crate) struct Deployment {
     stop: Stop,
     _topics: Vec<Topic>,

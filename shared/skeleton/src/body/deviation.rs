@@ -1,4 +1,4 @@
-//! Rates how unlike a person a skeleton is, in order to choose among many skeletons.
+//! Measures how much a skeleton deviates from a human body, in order to choose among many skeletons.
 
 use crate::body::bone::{self, BONES};
 use crate::body::proportion::MEASUREMENT_SD;
@@ -15,7 +15,7 @@ const USUAL: [f64; 2] = [0.95, 2.0];
 const UNUSUAL_SD: f64 = 0.05;
 const UNUSUAL_CAP: f64 = 4.0 * DEVIATION_CAP;
 
-/// Returns how unlike a person a skeleton is: squared standard deviations, summed over the 14 bones and the stature.
+/// Returns how much a skeleton deviates from a human body: squared standard deviations, summed over the 14 bones and the stature.
 ///
 /// Every bone adds the squared deviation of the logarithm of its length from that expected for the stature, at most [`DEVIATION_CAP`]. The
 /// stature is the one on which the bones agree best; it adds nothing between 0.95 and 2.0 m. A missing bone adds 1, as much as an average
