@@ -17,7 +17,7 @@ fn all_people_of_parse_and_lspet_are_valid() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn a_few_joints_lie_outside_by_no_more_than_two_pixels() {
+fn a_few_joints_are_outside_the_image_by_at_most_two_pixels() {
     let Some(shared) = shared_dir() else { return };
     let strict = ReadOptions {
         outside_px: 0.0,

@@ -333,7 +333,7 @@ fn model(shared: &Path, name: &str) -> Arc<Model> {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn poses_on_humaneva_and_umpm_images_agree_with_the_authors_program() {
+fn poses_on_humaneva_and_umpm_images_agree_with_the_program_of_the_authors() {
     let Some(shared) = shared_dir() else { return };
     let humaneva = model(&shared, "humaneva_fmp.txt");
     let umpm = model(&shared, "umpm_fmp.txt");
@@ -362,7 +362,7 @@ fn poses_on_humaneva_and_umpm_images_agree_with_the_authors_program() {
 
 #[test]
 #[ignore = "needs ../shared"]
-fn poses_on_grey_odd_sized_and_portrait_images_agree_with_the_authors_program() {
+fn poses_on_grey_odd_sized_and_portrait_images_agree_with_the_program_of_the_authors() {
     let Some(shared) = shared_dir() else { return };
     let model = model(&shared, "parse_fmp.mat");
     let jpeg = Picture::read_as_libjpeg(&shared.join("data/parse/im0101.jpg"));

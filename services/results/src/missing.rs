@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pose_that_the_result_did_not_use_was_late() {
+    fn a_pose_that_the_result_did_not_use_counts_as_late() {
         let mut history = history();
         let sent = pose(2, 0, Status::OK);
         assert_eq!(history.note_result(2, Some(&sent), false), Missing::Late);
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_before_a_later_pose_was_dropped() {
+    fn a_frame_without_a_pose_before_a_later_pose_counts_as_dropped() {
         let mut history = history();
         history.note_pose(&pose(4, 0, Status::OK));
         assert_eq!(history.note_result(3, None, false), Missing::Dropped);
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_capture_sent_before_its_death_was_late() {
+    fn a_frame_that_capture_sent_before_its_death_counts_as_late() {
         let mut history = history();
         history.note_frame(&captured(2, 0));
         history.note_frame(&captured(3, 0));
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_restarted_between_two_checks_is_lost() {
+    fn frames_of_a_process_restarted_between_two_checks_are_lost() {
         let mut history = history();
         history.note_ports(ports(1));
         assert_eq!(history.note_result(2, None, false), Missing::Late);
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_never_connected_is_late() {
+    fn frames_of_a_process_that_never_connected_count_as_late() {
         let mut history = ViewHistory::default();
         history.note_ports([Vec::new(), Vec::new()]);
         assert_eq!(history.note_result(0, None, false), Missing::Late);
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_frame_was_dropped_if_the_poses_ended_without_it() {
+    fn the_last_frame_counts_as_dropped_if_the_poses_ended_without_it() {
         let mut history = history();
         let mut end = captured(3, 0);
         end.status = Status::END;
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_after_the_end_of_the_footage_are_not_lost() {
+    fn frames_after_the_end_of_the_footage_do_not_count_as_lost() {
         let mut history = history();
         history.note_pose(&pose(3, 0, Status::END));
         assert_eq!(history.note_result(2, None, false), Missing::Dropped);

@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn the_work_of_an_iteration_is_the_processor_time_until_the_next() {
+    fn the_work_of_an_iteration_is_the_processor_time_until_the_next_iteration() {
         let mut work = Work::default();
         let millis = Duration::from_millis;
         // The start-up does not count as an iteration.

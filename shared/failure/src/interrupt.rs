@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "a bug")]
-    fn a_panic_is_passed_on() {
+    fn a_panic_of_the_work_is_passed_on() {
         let stop = Stop::new().unwrap();
         drop(unless_stopped(&stop, || panic!("a bug")));
     }

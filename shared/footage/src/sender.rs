@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_read_between_the_packets() {
+    fn sender_times_are_read_between_the_packets() {
         let packet = boxed(*b"mdat", &[9; 500]);
         let stream = [head(), time(90_000, 5_250), packet, time(93_600, 5_290)].concat();
         let got = read(&stream);

@@ -268,7 +268,7 @@ impl Reference<'_> {
 
 proptest! {
     #[test]
-    fn a_turned_image_is_the_mean_of_bilinear_samples_up_to_its_border(
+    fn a_rotated_image_is_the_mean_of_bilinear_samples_up_to_its_border(
         degrees in 1.0..359.0, scale in 0.4..4.0, dx in -20.0..20.0, dy in -20.0..20.0, is_black: bool,
     ) {
         let (source, output) = (Size::new(31, 26), Size::new(13, 11));

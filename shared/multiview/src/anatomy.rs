@@ -136,7 +136,7 @@ mod tests {
         }
 
         #[test]
-        fn moving_and_turning_the_world_changes_nothing(yaw in -3.0..3.0_f64, x in -5.0..5.0_f64) {
+        fn moving_and_rotating_the_world_changes_nothing(yaw in -3.0..3.0_f64, x in -5.0..5.0_f64) {
             let moved = Isometry3::new(Vector3::new(x, 1.0, 0.2), Vector3::z() * yaw);
             let joints: Vec<_> = standing().iter().map(|joint| joint.map(|point| moved * point)).collect();
             let up = Some(Vector3::z_axis());

@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn one_pair_is_outvoted_by_the_others() {
+    fn one_contradicting_pair_is_outvoted_by_the_others() {
         // The pair (1, 2) alone would prefer that both views see the same side.
         let pairs = [
             pair(0, 1, 2.0, 1.0),
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn the_previous_frame_breaks_a_near_tie() {
+    fn the_previous_frame_decides_a_near_tie() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
         let clear = [hypothesis(0b000, 2.0), hypothesis(0b010, 0.0)];
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn an_assignment_and_its_complement_are_the_same() {
+    fn an_assignment_and_its_complement_are_equivalent() {
         let mut filter = FacingFilter::default();
         let settings = FacingSettings::default();
         let first = [hypothesis(0b011, 2.0), hypothesis(0b010, 0.0)];

@@ -175,13 +175,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_that_misses_the_image_gives_zero_heat() {
+    fn a_line_outside_the_image_gives_zero_heat() {
         let missed = heat_map([[-1.0, -1.0]; 2], [64, 48], 6, 8);
         assert_eq!(missed, vec![0.0; 48]);
     }
 
     #[test]
-    fn the_line_is_hot_and_the_farthest_cell_is_cold() {
+    fn the_heat_is_highest_on_the_line_and_lowest_in_the_farthest_cell() {
         let map = heat_map([[0.5, 24.0], [64.5, 24.0]], [64, 48], 12, 16);
         let row = |row: usize| map[row * 16];
         assert_eq!(row(6), 1.0);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_between_two_pixels_are_rounded_to_the_even_one() {
+    fn line_ends_between_two_pixels_are_rounded_to_the_even_pixel() {
         for (y, row) in [(10.5, 10), (11.5, 12)] {
             let map = heat_map([[0.5, y], [64.5, y]], [64, 48], 48, 64);
             assert_eq!(map[row * 64 + 5], 1.0);

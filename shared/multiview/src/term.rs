@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_on_the_line_costs_nothing() {
+    fn a_point_on_the_epipolar_line_costs_nothing() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, f64::INFINITY).unwrap();
         assert_eq!(term.distance2([7.0, 30.0], 16.0), 0.0);
     }
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn the_cap_applies_to_either_direction() {
+    fn the_maximum_applies_to_the_distance_in_each_direction() {
         let term = Term::new(side_by_side(), [50.0, 30.0], 4.0, 3.0).unwrap();
         let got = term.distance2([7.0, 38.0], 4.0);
         assert!((got - (4.0 + 9.0)).abs() < 1e-12, "{got}");

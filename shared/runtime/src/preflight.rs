@@ -167,14 +167,14 @@ mod tests {
     }
 
     #[test]
-    fn chunks_are_subscribers_times_queued_and_borrowed_plus_one_loan() {
+    fn the_number_of_chunks_is_subscribers_times_queued_and_borrowed_plus_one_loan() {
         // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
         let chunk = 40_000_000 + 1472;
         assert_eq!(evidence(0, Delivery::Realtime).pool_bytes(), 7 * chunk);
     }
 
     #[test]
-    fn with_lossless_delivery_evidence_takes_one_chunk_more_than_borrowed() {
+    fn with_lossless_delivery_evidence_needs_one_chunk_more_than_the_receivers_hold() {
         let bytes = evidence(0, Delivery::Lossless).pool_bytes();
         assert_eq!(bytes, 3 * (40_000_000 + 1472));
     }

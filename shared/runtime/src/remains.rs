@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn other_lines_are_ignored() {
+    fn malformed_lines_and_locks_of_other_files_are_ignored() {
         let file = fs::metadata("/proc/self/maps").unwrap();
         for line in [
             "",

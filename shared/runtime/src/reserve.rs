@@ -105,7 +105,7 @@ mod tests {
     use std::os::unix::fs::MetadataExt as _;
 
     #[test]
-    fn setting_the_size_on_tmpfs_allocates_the_memory() {
+    fn enlarging_a_file_on_tmpfs_with_ftruncate_allocates_the_memory() {
         let file = tempfile::tempfile_in("/dev/shm").unwrap();
         // SAFETY: the file is open.
         let outcome = unsafe { libc::ftruncate(file.as_raw_fd(), 1 << 20) };

@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rehearsal_returns_the_same_denials_and_changes_nothing() {
+    fn a_dry_run_of_scheduling_returns_the_same_denials_and_changes_nothing() {
         let scheduling = Scheduling {
             cores: vec![own_cores().unwrap()[0], MAX_CORES],
             real_time: Some(RealTime {

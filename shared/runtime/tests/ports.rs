@@ -79,7 +79,7 @@ fn an_array_that_is_too_long_is_refused_with_the_numbers() {
 }
 
 #[test]
-fn a_dropped_loan_is_not_sent() {
+fn a_loan_that_is_dropped_is_not_sent() {
     let deployment = Deployment::new(&[frames(Delivery::Realtime, 10)]);
     let bus = deployment.bus("both");
     let mut waiter = bus.waiter();
@@ -279,7 +279,7 @@ fn a_missing_topic_is_refused() {
 }
 
 #[test]
-fn one_publisher_too_many_is_refused() {
+fn a_publisher_beyond_the_limit_is_refused() {
     let deployment = Deployment::new(&[small(Delivery::Realtime, 1)]);
     let bus = deployment.bus("greedy");
     let first = bus.publisher::<ViewQuality>("small").unwrap();

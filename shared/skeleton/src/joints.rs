@@ -234,7 +234,7 @@ mod tests {
     use crate::{MIRROR, N_PARTS, PART_NAMES};
 
     #[test]
-    fn joints_on_the_right_come_from_parts_on_the_right() {
+    fn joints_of_the_right_side_are_computed_from_parts_of_the_right_side() {
         for set in [&PARSE14, &UMPM15] {
             for joint in set.joints {
                 for &part in joint.parts {

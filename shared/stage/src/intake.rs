@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_is_processed_dropped_by_the_camera_or_lost() {
+    fn every_frame_is_processed_or_dropped_by_the_camera_or_lost() {
         let mut intake = intake(Delivery::Realtime);
         // Frames 0, 1 and 5 are lost, the camera drops 3 and 4, and 7 and 8 are lost before the end.
         assert_eq!(intake.n_lost_before(&header(2, 0)), 2);

@@ -137,14 +137,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_authors_thresholds_are_median_plus_inaccuracy() {
+    fn the_thresholds_of_the_authors_are_median_plus_inaccuracy() {
         assert_eq!(Tau::humaneva().px()[0], 9.783 + 8.294);
         assert_eq!(Tau::umpm().px()[15], 6.423 + 23.258);
         assert_eq!(Tau::humaneva().px().len(), 26);
     }
 
     #[test]
-    fn the_papers_thresholds_are_lower_for_every_part() {
+    fn the_thresholds_of_the_paper_are_lower_for_every_part() {
         for (errors, program) in [
             (TrainingErrors::HUMANEVA, Tau::humaneva()),
             (TrainingErrors::UMPM, Tau::umpm()),

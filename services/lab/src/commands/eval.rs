@@ -487,7 +487,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_and_shares_are_checked() {
+    fn sizes_and_fractions_are_checked() {
         assert_eq!(size("272x480"), Ok([272, 480]));
         assert!(size("272").is_err() && size("ax2").is_err());
         assert_eq!(share("0.8-1"), Ok([0.8, 1.0]));

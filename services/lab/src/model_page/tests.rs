@@ -110,7 +110,7 @@ fn the_ellipse_is_drawn_at_the_stated_spring_cost() {
 }
 
 #[test]
-fn a_filter_that_wants_vertical_edges_has_vertical_strokes() {
+fn a_filter_for_vertical_edges_is_drawn_with_vertical_strokes() {
     let mut spec = planted("person");
     for filter in &mut spec.filters {
         filter.weights.fill(-1.0);

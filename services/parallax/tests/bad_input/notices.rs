@@ -70,7 +70,7 @@ fn included_files_are_found_from_any_program_location() {
 }
 
 #[test]
-fn padding_is_reported_with_a_size_that_needs_none() {
+fn padding_is_reported_with_a_size_that_avoids_it() {
     let case = Case::new("oops-pad", &[2; 2], PLAIN);
     let said = |size: &str| {
         let set = format!("capture.size={size}");
@@ -91,7 +91,7 @@ fn padding_is_reported_with_a_size_that_needs_none() {
 }
 
 #[test]
-fn the_announced_size_of_a_recording_is_right() {
+fn the_announced_size_of_a_recording_is_correct() {
     let case = Case::new("oops-room", &[4; 2], PLAIN);
     let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
     case.assert_nothing_left();

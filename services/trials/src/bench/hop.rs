@@ -196,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_copied_message_has_another_location() {
+    fn a_copied_message_has_a_different_memory_location() {
         let spot = |message, offset| Spot {
             message,
             inode: 7,

@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_camera_is_not_killed() {
+    fn a_deployment_with_a_single_camera_has_no_run_with_a_killed_camera() {
         assert_eq!(names(Kind::Latency, 1), ["1 view"]);
     }
 }

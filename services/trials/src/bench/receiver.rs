@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_that_is_not_shared_has_no_location() {
+    fn memory_that_is_not_shared_has_no_shared_memory_location() {
         assert_eq!(Spot::of(3, &[0; 5000]), None);
     }
 }

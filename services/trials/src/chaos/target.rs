@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn results_record_the_epochs_of_capture_pose_and_triangulate() {
+    fn results_contain_the_epochs_of_capture_pose_and_triangulate() {
         assert_eq!(epoch_source_of("capture-2"), EpochSource::Camera(2));
         assert_eq!(epoch_source_of("pose-11"), EpochSource::Pose(11));
         assert_eq!(epoch_source_of("triangulate"), EpochSource::Result);

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_time_is_shown_as_never() {
+    fn a_time_without_measurement_is_shown_as_never() {
         let cost = Cost {
             noticed_ms: Some(3.4),
             ..Cost::default()

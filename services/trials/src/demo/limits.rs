@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_good_run_misses_nothing() {
+    fn a_good_run_meets_all_limits() {
         assert_eq!(missed(|_| ()), Vec::<String>::new());
         assert_eq!(Run::changed(|_| ()).limits().len(), 9);
     }

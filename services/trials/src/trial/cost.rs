@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn health_messages_tell_about_processes_that_results_do_not_record() {
+    fn health_messages_give_the_epochs_of_processes_that_results_do_not_contain() {
         let results = [
             moment(0, 100.0, None),
             moment(1, 300.0, None),

@@ -52,7 +52,7 @@ fn a_common_mistake_is_reported_with_its_line() {
 }
 
 #[test]
-fn a_short_file_is_enough() {
+fn a_short_deployment_file_is_enough() {
     let got = read(SHORT, &[]).unwrap().deployment;
     assert_eq!(got.paper.workers, 2);
     assert_eq!(got.capture, crate::capture::Config::default());

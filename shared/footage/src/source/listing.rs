@@ -276,7 +276,7 @@ mod tests {
 
         proptest! {
             #[test]
-            fn the_order_is_total(a in "[a-b0-2]{0,5}", b in "[a-b0-2]{0,5}", c in "[a-b0-2]{0,5}") {
+            fn the_natural_order_is_a_total_order(a in "[a-b0-2]{0,5}", b in "[a-b0-2]{0,5}", c in "[a-b0-2]{0,5}") {
                 prop_assert_eq!(natural_order(&a, &b), natural_order(&b, &a).reverse());
                 if natural_order(&a, &b).is_le() && natural_order(&b, &c).is_le() {
                     prop_assert!(natural_order(&a, &c).is_le());

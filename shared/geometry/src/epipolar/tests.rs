@@ -21,7 +21,7 @@ proptest! {
     }
 
     #[test]
-    fn exchanging_the_cameras_transposes_the_matrix(a in camera(), b in camera()) {
+    fn swapping_the_cameras_transposes_the_fundamental_matrix(a in camera(), b in camera()) {
         prop_assume!((a.centre_in_world() - b.centre_in_world()).norm() > 0.1);
         let (there, back) = (fundamental(&a, &b), fundamental(&b, &a).transpose());
         prop_assert!((there - back).norm().min((there + back).norm()) < 1e-9);

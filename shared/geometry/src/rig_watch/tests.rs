@@ -117,7 +117,7 @@ fn one_tilted_camera_of_three_is_suspected() {
 }
 
 #[test]
-fn an_offset_of_half_a_grid_cell_is_no_moved_camera() {
+fn an_offset_of_half_a_grid_cell_is_not_reported_as_a_moved_camera() {
     let cameras = around(4);
     let mut believed = cameras.clone();
     // The believed principal point is wrong by two pixels.

@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_of_equals_wins() {
+    fn ties_go_to_the_first() {
         let point = |alpha, area| Point {
             weights: without_appearance(alpha, None),
             area,

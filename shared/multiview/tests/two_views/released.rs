@@ -31,7 +31,7 @@ fn cycles(estimate: &PairEstimate) -> bool {
 }
 
 #[test]
-fn the_released_optimiser_can_cycle_where_the_papers_converges() {
+fn the_released_optimiser_can_cycle_where_the_optimiser_of_the_paper_converges() {
     let mut n_cycles = 0;
     for seed in 0..300 {
         let scene = Scene::new(seed, 2, &SIZES);

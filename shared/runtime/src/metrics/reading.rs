@@ -444,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_descending_percentiles_and_those_of_no_durations() {
+    fn refuses_descending_percentiles_and_percentiles_without_durations() {
         let expected = |count| ReadingError::Disordered { row: 0, count };
         assert_eq!(
             refused(|message| message.rows[0].p50_nanos = 3),

@@ -33,7 +33,7 @@ fn performed(recording: &Recording, number: u64) -> (Recorded, Bones, f64) {
 }
 
 #[test]
-fn a_subject_reproduces_the_subjects_own_recording() {
+fn a_subject_with_its_own_recording_reproduces_the_recording() {
     for action in Action::ALL {
         let (recording, motion) = recorded(3, action, 25.0, 100);
         let (it, bones, _) = performed(&recording, 3);
@@ -59,7 +59,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
     #[test]
-    fn bones_have_the_subjects_lengths_and_limbs_the_recorded_directions(
+    fn bones_have_the_lengths_of_the_subject_and_the_recorded_directions(
         number in 0_u64..50, other in 0_u64..50, seconds in -1.0..4.0_f64,
     ) {
         let (recording, _) = recorded(number, Action::Boxing, 20.0, 60);

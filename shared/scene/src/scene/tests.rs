@@ -132,7 +132,7 @@ fn the_same_settings_give_the_same_bits_in_any_order() {
 }
 
 #[test]
-fn a_person_covers_pixels_and_casts_a_shadow() {
+fn a_person_is_visible_and_casts_a_shadow() {
     let scene = scene("ring:2", Action::Gestures, 3);
     let mut view = View::new(&scene, 0).unwrap();
     let (rgb, _) = picture(&mut view, 5);

@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn the_groups_contain_every_joint_once_and_both_sides() {
+    fn the_groups_contain_every_joint_once_and_both_sides_together() {
         let mut joints: Vec<usize> = PCK_GROUPS.iter().flat_map(|pck_group| pck_group.1).collect();
         joints.sort_unstable();
         assert_eq!(joints, (0..14).collect::<Vec<_>>());

@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_overall_value_is_the_mean_of_its_twelve_rows() {
+    fn the_overall_value_of_the_paper_is_the_mean_of_its_twelve_rows() {
         let rows = [
             100.0, 99.47, 94.52, 88.31, 76.09, 71.53, 100.0, 60.63, 100.0, 100.0, 82.69, 73.58,
         ];

@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrist_off_costs_half_of_its_group() {
+    fn one_wrong_wrist_halves_the_score_of_its_group() {
         let truth = person();
         let mut found = truth;
         found[6][0] += 12.0;

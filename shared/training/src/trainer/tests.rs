@@ -274,7 +274,7 @@ fn training_without_backgrounds_is_refused() {
 }
 
 #[test]
-fn people_stay_in_the_working_set_even_if_well_separated() {
+fn examples_of_people_stay_in_the_working_set_even_if_well_separated() {
     let (album, watch) = (figures(), Quiet::endless());
     // With these settings, hardly any example whose share is 0 is kept.
     let settings = Settings {

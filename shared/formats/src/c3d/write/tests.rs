@@ -98,7 +98,7 @@ fn an_unannounced_number_of_points_or_frames_is_refused() {
 }
 
 #[test]
-fn cameras_and_residual_share_the_fourth_number() {
+fn the_fourth_number_encodes_cameras_and_residual() {
     let fourth = |residual: f64| {
         let marker = Marker {
             position: [0.0; 3],

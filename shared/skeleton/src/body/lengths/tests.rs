@@ -38,7 +38,7 @@ fn lengths_are_learned_from_noisy_frames() {
 }
 
 #[test]
-fn wild_frames_do_not_count() {
+fn implausible_frames_do_not_count() {
     let mut lengths = Lengths::default();
     let person = testing::standing(1.7);
     let mut wild = person;

@@ -51,7 +51,7 @@ fn noise_along_the_viewing_direction_is_reduced() {
 }
 
 #[test]
-fn learned_lengths_help_more() {
+fn learned_lengths_reduce_the_error_further() {
     let mut lengths = Lengths::default();
     testing::learn(&mut lengths, &unusual(&testing::walking(1.7)));
     let [before, after] = errors(unusual, 1.7, Some(&lengths));
@@ -179,7 +179,7 @@ fn the_result_is_a_minimum() {
 }
 
 #[test]
-fn an_impossible_limb_does_not_drag_its_neighbours() {
+fn an_impossible_limb_does_not_displace_its_neighbours() {
     let person = testing::walking(1.7);
     let mut wrong = person;
     wrong[6] = wrong[6].map(|wrong| wrong + Vector3::new(0.2, -1.0, 0.5));
