@@ -9,7 +9,7 @@ use crate::commands::{
 use terminal::{EXIT_CODES, Globals, completions};
 
 const LONG_ABOUT: &str = "\
-Calibrated, synchronised cameras in, 3D human skeletons out.
+Computes 3D human skeletons from calibrated, synchronised cameras.
 
 A deployment file describes a run in about ten lines: the cameras, their calibration, an output folder.
 A run has one process per stage and camera. `parallax run` starts and watches all of them:
@@ -46,7 +46,7 @@ Examples:
     parallax calib show Calib.toml                      print the content of a calibration file
 ";
 
-/// Calibrated cameras in, 3D human skeletons out.
+/// Computes 3D human skeletons from calibrated cameras.
 #[derive(Debug, Parser)]
 #[command(
     name = "parallax",

@@ -174,7 +174,7 @@ pub fn resize_part(
 fn check_resize(image: Rgb8View<'_>, [width, height]: [usize; 2]) {
     assert!(
         (1..=image.width()).contains(&width) && (1..=image.height()).contains(&height),
-        "resize only makes images smaller"
+        "resize can only reduce the size of an image"
     );
 }
 

@@ -236,5 +236,8 @@ fn check<E: Message, H: Header>(ids: Ids) {
         element: TypeId::of::<E>(),
         header: TypeId::of::<H>(),
     };
-    assert_eq!(asked, ids, "a topic is used with other types than it has");
+    assert_eq!(
+        asked, ids,
+        "a topic is used with types that it does not have"
+    );
 }

@@ -101,7 +101,7 @@ fn retimed(deployment: &Deployment, footage: Vec<Footage>) -> Result<Vec<Footage
     let looked = cameras.map(|((camera, timeline), found)| {
         let info = Retimed::look(&source(camera, capture), Some(&timeline)).map_err(|error| {
             let hint = format!(
-                "camera {:?} with `offset_ms` and `drift_ppm`: does its footage overlap in time with that of the other cameras?",
+                "camera {:?}: with this `offset_ms` and `drift_ppm`, does its footage overlap in time with that of the other cameras?",
                 camera.name
             );
             Failure::new(ExitKind::Input, error).with_hint(hint)

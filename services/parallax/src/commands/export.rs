@@ -11,7 +11,7 @@ use terminal::{Globals, Terminal, output};
 
 /// Note for a build without the format.
 const NO_PARQUET: &str =
-    "this build cannot write parquet: cargo build --release --features parquet";
+    "this build cannot write parquet: build it with `cargo build --release --features parquet`";
 /// The progress bar.
 const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 
