@@ -253,7 +253,7 @@ fn in_space(
         out,
         "<h2>The rig in space</h2>\n<canvas id=\"space\" width=\"900\" height=\"520\" role=\"img\" aria-label=\"the rig in space\"></canvas>\n\
          <p class=\"bar\"><button id=\"play\">pause</button> <input id=\"at\" type=\"range\" min=\"0\" value=\"0\"> <label hidden><input id=\"truth\" type=\"checkbox\"></label> <span id=\"said\"></span></p>\n\
-         <p class=\"note\">Drag to turn, wheel to come nearer. The squares of the floor are a metre wide.</p>\n\
+         <p class=\"note\">Drag to rotate, turn the wheel to zoom. The squares of the floor are a metre wide.</p>\n\
          <script type=\"application/json\" id=\"data\">{}</script>\n<script type=\"module\">{}</script>\n",
         Html::in_script(&data),
         Html::constant(SCRIPT)
