@@ -46,7 +46,7 @@ pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };
 pub use fused_view::FusedView;
-pub use look_budget::LookBudget;
+pub use look_budget::{LookBudget, Spent};
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
 pub use network_step::{Eyes, NetworkSettings, NetworkStep, most_values};

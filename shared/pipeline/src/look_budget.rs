@@ -8,8 +8,10 @@ const NEW_COST: f64 = 0.05;
 const NEW_LOAD: f64 = 0.2;
 /// A view is too slow if its frames take more than this share of the time between frames.
 const MOST_LOAD: f64 = 0.9;
-/// Factor for the budget per frame while the view is too slow, and growth per frame otherwise.
+/// Factors for the budget: per frame while the view is too slow, after frames that were dropped, and per frame otherwise. Frames are dropped
+/// although this view is fast enough if other processes have too little time, for example those that decode its pictures.
 const LESS: f64 = 0.95;
+const AFTER_DROPPED: f64 = 0.9;
 const MORE: f64 = 1.01;
 /// Minimum share of the budget that is kept.
 const LEAST_KEPT: f64 = 0.1;
@@ -27,6 +29,19 @@ pub struct LookBudget {
     cost_s: Option<f64>,
     /// Mean duration of a frame, as a fraction of the interval.
     load: f64,
+}
+
+/// Runs of the network in a frame, and the times that the frame took.
+#[derive(Debug, Clone, Copy)]
+pub struct Spent {
+    /// Number of runs.
+    pub n_looks: f64,
+    /// Processor time, in seconds.
+    pub processor_s: f64,
+    /// Time on the clock, in seconds.
+    pub clock_s: f64,
+    /// True if frames before this one were dropped.
+    pub has_dropped: bool,
 }
 
 impl LookBudget {
@@ -50,18 +65,18 @@ impl LookBudget {
     }
 
     /// Takes note of the times that a frame took.
-    ///
-    /// * `n_looks`: number of runs.
-    /// * `times_s`: processor time, and time on the clock, in seconds.
-    pub fn spent(&mut self, n_looks: f64, [processor_s, clock_s]: [f64; 2]) {
-        self.load += NEW_LOAD * (clock_s / self.interval_s - self.load);
-        self.kept = if self.load > MOST_LOAD {
-            (self.kept * LESS).max(LEAST_KEPT)
+    pub fn spent(&mut self, spent: &Spent) {
+        self.load += NEW_LOAD * (spent.clock_s / self.interval_s - self.load);
+        let factor = if spent.has_dropped {
+            AFTER_DROPPED
+        } else if self.load > MOST_LOAD {
+            LESS
         } else {
-            (self.kept * MORE).min(1.0)
+            MORE
         };
-        if n_looks > 0.0 && processor_s > 0.0 {
-            let new = processor_s / n_looks;
+        self.kept = (self.kept * factor).clamp(LEAST_KEPT, 1.0);
+        if spent.n_looks > 0.0 && spent.processor_s > 0.0 {
+            let new = spent.processor_s / spent.n_looks;
             self.cost_s = Some(self.cost_s.map_or(new, |cost| cost + NEW_COST * (new - cost)));
         }
     }
@@ -71,14 +86,23 @@ impl LookBudget {
 mod tests {
     use super::*;
 
+    fn frame(n_looks: f64, processor_s: f64, clock_s: f64) -> Spent {
+        Spent {
+            n_looks,
+            processor_s,
+            clock_s,
+            has_dropped: false,
+        }
+    }
+
     #[test]
     fn the_budget_is_the_number_of_network_runs_that_the_cores_manage_between_two_frames() {
         let mut budget = LookBudget::new(0.5, 1.0 / 15.0);
         assert_eq!(budget.looks(), None, "nothing is known yet");
-        budget.spent(4.0, [0.04, 0.05]);
+        budget.spent(&frame(4.0, 0.04, 0.05));
         // 20 ms of 67 ms on half a core, at 10 ms a run.
         assert!((budget.looks().unwrap() - 2.0).abs() < 1e-9);
-        budget.spent(0.0, [0.001, 0.001]);
+        budget.spent(&frame(0.0, 0.001, 0.001));
         assert!(
             (budget.looks().unwrap() - 2.0).abs() < 1e-9,
             "no run, no news"
@@ -89,7 +113,7 @@ mod tests {
     fn a_view_that_does_not_keep_up_runs_the_network_less_often_until_it_does() {
         let mut budget = LookBudget::new(1.0, 0.05);
         let looks_after = |budget: &mut LookBudget, n: u32, clock_s: f64| {
-            (0..n).for_each(|_| budget.spent(1.0, [0.01, clock_s]));
+            (0..n).for_each(|_| budget.spent(&frame(1.0, 0.01, clock_s)));
             budget.looks().unwrap()
         };
         let at_first = looks_after(&mut budget, 1, 0.02);
@@ -97,5 +121,22 @@ mod tests {
         let slow = looks_after(&mut budget, 20, 0.08);
         assert!(slow < 0.5 * at_first && slow > 0.0, "{slow}");
         assert_eq!(looks_after(&mut budget, 200, 0.02), at_first);
+    }
+
+    #[test]
+    fn a_view_whose_frames_are_dropped_runs_the_network_less_often() {
+        let mut budget = LookBudget::new(1.0, 0.05);
+        let fast = frame(1.0, 0.01, 0.02);
+        let dropped = Spent {
+            has_dropped: true,
+            ..fast
+        };
+        budget.spent(&fast);
+        let at_first = budget.looks().unwrap();
+        (0..6).for_each(|_| budget.spent(&dropped));
+        let after = budget.looks().unwrap();
+        assert!(after < 0.6 * at_first && after > 0.0, "{after}");
+        (0..200).for_each(|_| budget.spent(&fast));
+        assert_eq!(budget.looks(), Some(at_first));
     }
 }

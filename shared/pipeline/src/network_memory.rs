@@ -227,6 +227,11 @@ impl NetworkMemory {
         self.n_looks
     }
 
+    /// Returns true if frames between the last two were dropped or lost.
+    pub fn has_dropped(&self) -> bool {
+        self.hold.is_some_and(|hold| hold.gap > 1)
+    }
+
     /// Takes note of the runs of a frame.
     pub(crate) fn spend(&mut self, n_runs: u64) {
         self.n_looks = n_runs as f64 + if self.has_searched { SEARCH } else { 0.0 };

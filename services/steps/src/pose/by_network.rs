@@ -3,7 +3,7 @@
 use failure::{ExitKind, Failure, OrFail as _, now_nanos, processor_nanos};
 use kernels::Rgb8View;
 use messages::{Searched, Stamp, Status, ViewPose};
-use pipeline::{NetworkMemory, NetworkStep};
+use pipeline::{NetworkMemory, NetworkStep, Spent};
 use posenetwork::{MapGrid, PersonMaps};
 
 use crate::pose::memory::NetworkState;
@@ -22,8 +22,14 @@ impl View<'_> {
         let result = step.look(image, &mut state.memory);
         if let Some(budget) = &mut state.budget {
             let ended = [processor_nanos(), now_nanos()];
-            let times_s = [0, 1].map(|clock| (ended[clock] - began[clock]) as f64 * 1e-9);
-            budget.spent(state.memory.n_looks(), times_s);
+            let [processor_s, clock_s] =
+                [0, 1].map(|clock| (ended[clock] - began[clock]) as f64 * 1e-9);
+            budget.spent(&Spent {
+                n_looks: state.memory.n_looks(),
+                processor_s,
+                clock_s,
+                has_dropped: state.memory.has_dropped(),
+            });
         }
         if let Err(error) = result {
             if !state.has_failed {
