@@ -283,7 +283,12 @@ mod long {
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
         assert!(ended.stderr.contains("model.plx"), "{}", ended.stderr);
         let last = case.lines("pose3d.jsonl").pop().unwrap();
-        assert_eq!(last["frame"], json!(N_FRAMES - 1));
+        assert_eq!(
+            last["frame"],
+            json!(N_FRAMES - 1),
+            "{}\n{report:#}",
+            ended.stderr
+        );
         assert_eq!(last["views_present"], json!(["a", "c"]));
     }
 }

@@ -163,7 +163,7 @@ fn held_and_omitted_frames_are_reported() {
     let notes = notes.join("\n");
     assert!(notes.contains("in 2 of 10 frames (1 of them"), "{notes}");
     assert!(notes.contains("frames 14-15"), "{notes}");
-    assert!(notes.contains("left out: head"), "{notes}");
+    assert!(notes.contains("their parent joint: head"), "{notes}");
 }
 
 #[test]
