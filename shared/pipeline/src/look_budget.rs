@@ -21,6 +21,8 @@ const LEAST_KEPT: f64 = 0.1;
 pub struct LookBudget {
     /// Time between frames, in seconds.
     interval_s: f64,
+    /// Difference between the numbers of frames if none is dropped.
+    frame_step: u64,
     /// Processor time per frame, in seconds, if the view keeps up.
     most_s: f64,
     /// Fraction of `most_s` that is used. It decreases while the view is too slow, because other programs may need the cores.
@@ -40,18 +42,19 @@ pub struct Spent {
     pub processor_s: f64,
     /// Time on the clock, in seconds.
     pub clock_s: f64,
-    /// True if frames before this one were dropped.
-    pub has_dropped: bool,
+    /// Difference between the numbers of this frame and the one before.
+    pub n_frames: u64,
 }
 
 impl LookBudget {
     /// Creates the budget of a view.
     ///
     /// * `cores_per_view`: number of cores divided by the number of views that they process.
-    /// * `interval_s`: time between frames, in seconds.
-    pub fn new(cores_per_view: f64, interval_s: f64) -> Self {
+    /// * `interval_s`: time between frames, in seconds; `frame_step`: difference between their numbers if none is dropped.
+    pub fn new(cores_per_view: f64, interval_s: f64, frame_step: u64) -> Self {
         Self {
             interval_s,
+            frame_step,
             most_s: SHARE * cores_per_view * interval_s,
             kept: 1.0,
             cost_s: None,
@@ -67,7 +70,7 @@ impl LookBudget {
     /// Takes note of the times that a frame took.
     pub fn spent(&mut self, spent: &Spent) {
         self.load += NEW_LOAD * (spent.clock_s / self.interval_s - self.load);
-        let factor = if spent.has_dropped {
+        let factor = if spent.n_frames > self.frame_step {
             AFTER_DROPPED
         } else if self.load > MOST_LOAD {
             LESS
@@ -91,13 +94,13 @@ mod tests {
             n_looks,
             processor_s,
             clock_s,
-            has_dropped: false,
+            n_frames: 2,
         }
     }
 
     #[test]
     fn the_budget_is_the_number_of_network_runs_that_the_cores_manage_between_two_frames() {
-        let mut budget = LookBudget::new(0.5, 1.0 / 15.0);
+        let mut budget = LookBudget::new(0.5, 1.0 / 15.0, 2);
         assert_eq!(budget.looks(), None, "nothing is known yet");
         budget.spent(&frame(4.0, 0.04, 0.05));
         // 20 ms of 67 ms on half a core, at 10 ms a run.
@@ -111,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_view_that_does_not_keep_up_runs_the_network_less_often_until_it_does() {
-        let mut budget = LookBudget::new(1.0, 0.05);
+        let mut budget = LookBudget::new(1.0, 0.05, 2);
         let looks_after = |budget: &mut LookBudget, n: u32, clock_s: f64| {
             (0..n).for_each(|_| budget.spent(&frame(1.0, 0.01, clock_s)));
             budget.looks().unwrap()
@@ -125,10 +128,10 @@ mod tests {
 
     #[test]
     fn a_view_whose_frames_are_dropped_runs_the_network_less_often() {
-        let mut budget = LookBudget::new(1.0, 0.05);
+        let mut budget = LookBudget::new(1.0, 0.05, 2);
         let fast = frame(1.0, 0.01, 0.02);
         let dropped = Spent {
-            has_dropped: true,
+            n_frames: 4,
             ..fast
         };
         budget.spent(&fast);

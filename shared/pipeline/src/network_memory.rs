@@ -227,9 +227,9 @@ impl NetworkMemory {
         self.n_looks
     }
 
-    /// Returns true if frames between the last two were dropped or lost.
-    pub fn has_dropped(&self) -> bool {
-        self.hold.is_some_and(|hold| hold.gap > 1)
+    /// Returns the difference between the numbers of the last two frames; 0 if there was only one, or if the frame rate is unknown.
+    pub fn n_frames(&self) -> u64 {
+        self.hold.map_or(0, |hold| hold.gap)
     }
 
     /// Takes note of the runs of a frame.

@@ -26,6 +26,6 @@ pub(super) fn looks(resolved: &Resolved, topology: &Topology) -> pose::Looks {
     let (Some(rate_hz), Some(per_view)) = (rate_hz, each(topology, Stage::Pose)) else {
         return pose::Looks::All;
     };
-    let interval_s = deployment.capture.frame_step.max(1) as f64 / rate_hz;
-    pose::Looks::Affordable(LookBudget::new(per_view, interval_s))
+    let step = deployment.capture.frame_step.max(1);
+    pose::Looks::Affordable(LookBudget::new(per_view, step as f64 / rate_hz, step))
 }

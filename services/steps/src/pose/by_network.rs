@@ -28,7 +28,7 @@ impl View<'_> {
                 n_looks: state.memory.n_looks(),
                 processor_s,
                 clock_s,
-                has_dropped: state.memory.has_dropped(),
+                n_frames: state.memory.n_frames(),
             });
         }
         if let Err(error) = result {
