@@ -88,8 +88,8 @@ pub fn prepare(
 }
 
 /// Returns the box around joints with a margin; `None` if fewer than two are known.
-fn around_joints(joints: impl Iterator<Item = [f64; 2]>) -> Option<[f64; 4]> {
-    let known = joints.filter(|at| at.iter().all(|side| side.is_finite()));
+fn around_joints(joints: impl IntoIterator<Item = [f64; 2]>) -> Option<[f64; 4]> {
+    let known = joints.into_iter().filter(|at| at.iter().all(|side| side.is_finite()));
     let [left, top, right, bottom] = posenetwork::outline_of(known)?;
     let beyond = BEYOND * (right - left).max(bottom - top);
     (beyond > 0.0).then_some([left - beyond, top - beyond, right + beyond, bottom + beyond])

@@ -34,6 +34,12 @@ impl<T> Prepared<T> {
         };
         to.push(example);
     }
+
+    /// Adds all examples of another list.
+    pub fn append(&mut self, mut others: Self) {
+        self.learnt.append(&mut others.learnt);
+        self.kept.append(&mut others.kept);
+    }
 }
 
 /// A kind of example with its own file format.

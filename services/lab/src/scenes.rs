@@ -6,6 +6,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _};
 use kernels::Rgb8View;
 use rayon::prelude::*;
+use scene::truth::N_JOINTS;
 use scene::{Action, Flaws, N_EXTRAS, RigChoice, Scene, Settings, View};
 
 /// Settings of the scenes.
@@ -42,15 +43,22 @@ pub(crate) struct Shown<'a> {
     pub(crate) picture: Rgb8View<'a>,
     /// Joints of `skeleton::PARSE14` in the picture, in pixels; not finite where they are not visible.
     pub(crate) joints: Vec<[f64; 2]>,
-    /// Nose, heels and big toes in the picture, in the order of [`Scene::extras`], in pixels; not finite behind the camera.
-    pub(crate) extras: [[f64; 2]; N_EXTRAS],
-    /// The joints in world coordinates, in metres.
-    pub(crate) in_world: Vec<[f64; 3]>,
     /// The camera.
     pub(crate) camera: &'a geometry::Camera,
-    /// Joints of every person in the picture, with the number of pixels that show the person. The subject comes first. Joints are not
-    /// finite behind the camera.
-    pub(crate) everybody: Vec<(Vec<[f64; 2]>, f64)>,
+    /// Every person in the picture. The subject comes first.
+    pub(crate) everybody: Vec<Body>,
+}
+
+/// A person in a picture.
+pub(crate) struct Body {
+    /// Joints of `skeleton::PARSE14` in world coordinates, in metres.
+    pub(crate) in_world: [[f64; 3]; N_JOINTS],
+    /// The joints in the picture, in pixels; not finite behind the camera.
+    pub(crate) joints: [[f64; 2]; N_JOINTS],
+    /// Nose, heels and big toes in the picture, in the order of [`Scene::extras`], in pixels; not finite behind the camera.
+    pub(crate) extras: [[f64; 2]; N_EXTRAS],
+    /// Number of pixels that show the person.
+    pub(crate) seen_px: f64,
 }
 
 /// Calls a function on every picture of all scenes, and returns the results in the order of the scenes, whatever the number of threads.
@@ -136,11 +144,6 @@ fn of_scene<T>(
                 ),
                 picture: Rgb8View::new(size.width, size.height, &rgb).or_fail(ExitKind::Run)?,
                 joints: joints.to_vec(),
-                extras: scene.extras(truth.seconds).map(|at| {
-                    let pixel = camera.project(&at.into());
-                    pixel.map_or([f64::NAN; 2], Into::into)
-                }),
-                in_world: scene.joints(truth.seconds).to_vec(),
                 camera,
                 everybody: everybody(&scene, camera, (truth.seconds, &view)),
             };
@@ -153,19 +156,19 @@ fn of_scene<T>(
 }
 
 /// Returns all people in the last picture of a view, the subject first.
-fn everybody(
-    scene: &Scene,
-    camera: &geometry::Camera,
-    (seconds, view): (f64, &View),
-) -> Vec<(Vec<[f64; 2]>, f64)> {
-    let others = scene.other_joints(seconds);
-    let all = core::iter::once(scene.joints(seconds)).chain(others);
-    let pixels = all.map(|joints| {
-        let pixels = joints.iter().map(|joint| {
-            let pixel = camera.project(&(*joint).into());
-            pixel.map_or([f64::NAN; 2], Into::into)
-        });
-        pixels.collect()
+fn everybody(scene: &Scene, camera: &geometry::Camera, (seconds, view): (f64, &View)) -> Vec<Body> {
+    let in_picture = |at: &[f64; 3]| {
+        let pixel = camera.project(&(*at).into());
+        pixel.map_or([f64::NAN; 2], Into::into)
+    };
+    let joints = core::iter::once(scene.joints(seconds)).chain(scene.other_joints(seconds));
+    let extras = core::iter::once(scene.extras(seconds)).chain(scene.other_extras(seconds));
+    let all = joints.zip(extras).zip(view.seen_px());
+    let bodies = all.map(|((in_world, extras), seen_px)| Body {
+        in_world,
+        joints: in_world.each_ref().map(in_picture),
+        extras: extras.each_ref().map(in_picture),
+        seen_px,
     });
-    pixels.zip(view.seen_px()).collect()
+    bodies.collect()
 }

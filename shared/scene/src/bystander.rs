@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::body::{N_BONES, PELVIS};
+use crate::body::{N_BONES, N_EXTRAS, PELVIS};
 use crate::mesh;
 use crate::motion::{Action, Motion};
 use crate::painter::Figure;
@@ -131,5 +131,10 @@ impl Bystander {
     /// Returns the joints of `skeleton::PARSE14` at a time, in the frame of the stage.
     pub(crate) fn joints(&self, seconds: f64) -> [Point3<f64>; N_JOINTS] {
         self.way.motion.bones.joints(&self.frames(seconds))
+    }
+
+    /// Returns the nose, heels and big toes at a time, in the frame of the stage.
+    pub(crate) fn extras(&self, seconds: f64) -> [Point3<f64>; N_EXTRAS] {
+        self.way.motion.bones.extras(&self.frames(seconds))
     }
 }

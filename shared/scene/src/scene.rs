@@ -203,6 +203,15 @@ impl Scene {
         extras.map(|extra| (self.world_from_stage * extra).coords.into())
     }
 
+    /// Returns the same points of every other person, in the order of [`other_joints`](Self::other_joints).
+    pub fn other_extras(&self, seconds: f64) -> Vec<[[f64; 3]; N_EXTRAS]> {
+        let in_world = |extras: [Point3<f64>; N_EXTRAS]| {
+            extras.map(|extra| (self.world_from_stage * extra).coords.into())
+        };
+        let others = self.others.iter();
+        others.map(|other| in_world(other.extras(seconds))).collect()
+    }
+
     /// Returns the index of a camera, given its name in the rig or its index.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use training::networks::pose::{
-    N_JOINTS, N_KEYPOINTS, Person, PoseTask, Settings, Shape, Source, Target, peak, plain,
+    N_KEYPOINTS, Person, PoseTask, Settings, Shape, Source, Target, Vary, peak, plain, varied,
 };
 use training::networks::{Backend, Plan, Precision, TrainError, Trainer};
 
@@ -251,6 +251,26 @@ fn a_changed_checkpoint_and_one_of_another_training_are_refused() {
 }
 
 #[test]
+fn a_window_beside_the_person_has_no_heat_in_any_map() {
+    let (people, shape) = (people(2, 3), small().shape);
+    for (empty, is_empty) in [(0.0, false), (1.0, true)] {
+        let vary = Vary {
+            empty,
+            ..Vary::default()
+        };
+        let mut rng = fastrand::Rng::with_seed(5);
+        let sample = varied(&people[0], &people[1], (&shape, &vary), &mut rng).unwrap();
+        let n_hot = sample.maps.iter().filter(|heat| **heat > 0.5).count();
+        assert_eq!((n_hot == 0, sample.front == [0.0; 2]), (is_empty, is_empty));
+        assert_eq!(
+            sample.weights == [1.0; N_KEYPOINTS],
+            is_empty,
+            "all maps count"
+        );
+    }
+}
+
+#[test]
 fn training_continues_from_a_written_network() {
     let people = people(6, 4);
     let settings = small();
@@ -342,44 +362,4 @@ fn found_by(file: Vec<u8>, shape: &Shape, picture: &[f32]) -> Vec<Vec<f32>> {
         })
         .unwrap();
     outputs
-}
-
-#[test]
-fn training_extra_keypoints_alone_leaves_all_other_weights_unchanged() {
-    let people = people(10, 6);
-    let shown = [&people[..8], &people[8..]];
-    let settings = small();
-    let mut whole = trainer(&settings, shown, None);
-    assert!(whole.run(steps(20), &mut |_| true));
-    let before = whole.onnx(&[]);
-    let alone = Settings {
-        extras_alone: true,
-        ..small()
-    };
-    // Renames the layers of the extra keypoints, so that the network lacks them.
-    let mut without = before.clone();
-    for at in 0..without.len() - 6 {
-        if &without[at..at + 6] == b"extra_" {
-            without[at..at + 6].copy_from_slice(b"other_");
-        }
-    }
-    let from = training::networks::pose::begun(&alone.shape, 7, &without).unwrap();
-    let task = PoseTask::new(&alone, shown, Some(from)).unwrap();
-    let mut trainer = Trainer::new(task, Backend::BuiltIn, None).unwrap();
-    assert!(trainer.run(steps(16), &mut |_| true));
-    assert!(trainer.run(steps(48), &mut |_| true));
-    let passes = trainer.passes();
-    assert!(
-        passes[1].cost.maps < 0.9 * passes[0].cost.maps,
-        "the head learns: {passes:?}"
-    );
-    let sample = plain(&people[9], &alone.shape).unwrap();
-    let files = [before, trainer.onnx(&[])];
-    let [before, after] = files.map(|file| found_by(file, &alone.shape, &sample.picture));
-    let [columns, rows] = alone.shape.cells();
-    let joints = N_JOINTS * columns * rows;
-    assert_eq!(before[0][..joints], after[0][..joints], "maps of joints");
-    assert_ne!(before[0][joints..], after[0][joints..], "extra maps");
-    assert_eq!(before[1], after[1], "direction");
-    assert_eq!(before[2][..N_JOINTS], after[2][..N_JOINTS], "errors");
 }

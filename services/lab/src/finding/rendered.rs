@@ -34,12 +34,12 @@ pub(super) fn pictures(
 
 fn picture(shown: &Shown<'_>) -> Option<(u64, Picture)> {
     let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
-    let people = shown.everybody.iter().filter_map(|(joints, seen_px)| {
-        let outline = around_joints(joints.iter().copied())?;
+    let people = shown.everybody.iter().filter_map(|body| {
+        let outline = around_joints(body.joints)?;
         let [left, top, right, bottom] = outline;
         let size = [shown.picture.width(), shown.picture.height()].map(|side| side as f64);
         let inside = (right.min(size[0]) - left.max(0.0)) * (bottom.min(size[1]) - top.max(0.0));
-        (*seen_px > 0.0).then_some((outline, *seen_px > HIDDEN * inside))
+        (body.seen_px > 0.0).then_some((outline, body.seen_px > HIDDEN * inside))
     });
     let people: Vec<_> = people.collect();
     Some((

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use failure::Failure;
 use fmp::{Model, Scope};
+use geometry::Camera;
 use nalgebra::{Point3, Vector3};
 use training::datasets::SkeletonTable;
 use viewquality::Sampler;
@@ -55,7 +56,7 @@ fn sample(
     let head = viewquality::orientation::head_of(&centres)?;
     Some(Sample {
         tile: Tile::around(shown.picture, bounds, head, &mut Sampler::default())?,
-        front: front_in_view(shown)?,
+        front: front_in_view(shown.camera, &shown.everybody.first()?.in_world)?,
         is_photograph: false,
     })
 }
@@ -75,9 +76,10 @@ fn mean_error(centres: &[[f64; 2]], truth: &[[f64; 2]]) -> Option<f64> {
 }
 
 /// Returns the direction in which the person faces, computed from the true 3D joints.
-pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
-    let joints: Vec<Option<Point3<f64>>> = shown
-        .in_world
+///
+/// * `in_world`: joints of `skeleton::PARSE14` in world coordinates.
+pub(crate) fn front_in_view(camera: &Camera, in_world: &[[f64; 3]]) -> Option<[f32; 2]> {
+    let joints: Vec<Option<Point3<f64>>> = in_world
         .iter()
         .map(|in_world| {
             in_world.iter().all(|value| value.is_finite()).then(|| Point3::from(*in_world))
@@ -87,6 +89,6 @@ pub(crate) fn front_in_view(shown: &Shown<'_>) -> Option<[f32; 2]> {
     let sum: Vector3<f64> = known.iter().map(|joint| joint.coords).sum();
     let place = Point3::from(sum / known.len().max(1) as f64);
     let front = multiview::front(&joints)?;
-    let in_view = multiview::front_in_view(shown.camera, &place, &front);
+    let in_view = multiview::front_in_view(camera, &place, &front);
     Some(in_view.map(|in_view| in_view as f32))
 }

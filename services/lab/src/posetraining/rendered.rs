@@ -1,19 +1,19 @@
 //! Synthetic people.
 
 use failure::Failure;
-use training::networks::pose::{
-    EXTRAS, N_JOINTS, N_KEYPOINTS, Person, Source, Target, exchange_sides,
-};
+use training::networks::pose::{EXTRAS, N_KEYPOINTS, Person, Source, Target, exchange_sides};
 
 use super::Work;
 use super::crop::Crop;
 use crate::orientation::front_in_view;
-use crate::scenes::{Scenes, Shown, of_pictures};
+use crate::scenes::{Body, Scenes, Shown, of_pictures};
 
-/// Smallest number of visible joints for a person to be used.
+/// Smallest number of joints in front of the camera for a person to be used.
 const FEWEST: usize = 10;
+/// A person is not used if less than this fraction of the pixels in the box show the person. Without occlusion, it is about a third.
+const HIDDEN: f64 = 0.1;
 
-/// Returns the people of all scenes, with the numbers of the subjects.
+/// Returns everybody in all scenes, with the numbers of the scenes' subjects.
 pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Person)>, Failure> {
     let console = work.console;
     if scenes.n == 0 {
@@ -24,42 +24,45 @@ pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Perso
         scenes,
         |shown| {
             work.go_on()?;
-            Ok(person(shown))
+            Ok(Some(in_picture(shown)))
         },
         |n, _| console.advance(n),
     );
     console.finish();
-    let found = found?;
+    let found: Vec<_> = found?.into_iter().flatten().collect();
     console.message(&format!("scenes: {} pictures of people", found.len()));
     Ok(found)
 }
 
-fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
-    let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
-    let joints: [[f64; 2]; N_JOINTS] = shown.joints.as_slice().try_into().ok()?;
+/// Returns the people in a picture.
+fn in_picture(shown: &Shown<'_>) -> Vec<(u64, Person)> {
+    let subject = shown.group.rsplit(' ').next().and_then(|number| number.parse().ok());
+    let people = shown.everybody.iter().filter_map(|body| Some((subject?, person(shown, body)?)));
+    people.collect()
+}
+
+fn person(shown: &Shown<'_>, body: &Body) -> Option<Person> {
+    let joints = body.joints;
     let n_seen = joints.iter().filter(|joint| joint[0].is_finite()).count();
-    if n_seen < FEWEST {
+    if n_seen < FEWEST || !is_seen(shown, body) {
         return None;
     }
     let crop = Crop::around(&joints, 0.0)?;
-    let [right, towards] = front_in_view(shown)?;
-    let keypoints: [[f64; 2]; N_KEYPOINTS] = core::array::from_fn(|keypoint| {
-        let extra = keypoint.checked_sub(N_JOINTS);
-        extra.map_or_else(|| joints[keypoint], |extra| shown.extras[extra])
-    });
-    let targets = keypoints.map(|at| {
-        if !at[0].is_finite() {
-            return Target::UNKNOWN;
+    let [right, towards] = front_in_view(shown.camera, &body.in_world)?;
+    let keypoints = joints.into_iter().chain(body.extras);
+    let mut targets = [Target::UNKNOWN; N_KEYPOINTS];
+    for (target, at) in targets.iter_mut().zip(keypoints) {
+        if at[0].is_finite() {
+            *target = Target {
+                at: crop.inside(at).map(|value| value as f32),
+                or: None,
+                weight: 1.0,
+                is_marked: true,
+            };
         }
-        Target {
-            at: crop.inside(at).map(|value| value as f32),
-            or: None,
-            weight: 1.0,
-            is_marked: true,
-        }
-    });
+    }
     let is_from_behind = towards < 0.0;
-    let person = Person {
+    Some(Person {
         source: Source::Scene,
         name: shown.source.clone(),
         rgb: crop.rgb(shown.picture),
@@ -69,8 +72,21 @@ fn person(shown: &Shown<'_>) -> Option<(u64, Person)> {
             targets
         },
         front: [right, 0.0, towards],
+    })
+}
+
+/// Returns true if enough of a person is visible.
+fn is_seen(shown: &Shown<'_>, body: &Body) -> bool {
+    let known = body.joints.into_iter().filter(|at| at.iter().all(|side| side.is_finite()));
+    let Some([left, top, right, bottom]) = posenetwork::outline_of(known) else {
+        return false;
     };
-    Some((subject, person))
+    let size = [shown.picture.width(), shown.picture.height()].map(|side| side as f64);
+    let inside = [
+        right.min(size[0]) - left.max(0.0),
+        bottom.min(size[1]) - top.max(0.0),
+    ];
+    inside.iter().all(|side| *side > 0.0) && body.seen_px > HIDDEN * inside[0] * inside[1]
 }
 
 /// Scenes and the network have the same extra keypoints.

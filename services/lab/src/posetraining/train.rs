@@ -1,8 +1,8 @@
 //! The training: from prepared people to an ONNX file with its card.
 
 use exports::report::curves::{self, Line, Panel};
-use training::networks::Trainer;
-use training::networks::pose::{self, About, Begun, Cost, PoseTask, Score, Settings};
+use training::networks::pose::{self, About, Cost, PoseTask, Score, Settings};
+use training::networks::{Parameter, Trainer};
 
 use super::Prepared;
 use crate::trained::{self, Job, Shown};
@@ -13,13 +13,8 @@ use inputs::cards::METADATA_KEY;
 pub type Pass = training::networks::Pass<Cost, Score>;
 
 /// Reads the network to start from; `None` for random parameters.
-fn begun(job: &Job, settings: &Settings) -> Result<Option<Begun>, Failure> {
+fn begun(job: &Job, settings: &Settings) -> Result<Option<Vec<Parameter>>, Failure> {
     let Some(from) = &job.from else {
-        if settings.extras_alone {
-            let message = "extras_alone = true trains only the extra keypoints of an existing network, but no network is given";
-            let hint = "give the network with --from, or remove extras_alone from the settings";
-            return Err(Failure::new(ExitKind::Usage, message).with_hint(hint));
-        }
         return Ok(None);
     };
     let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
@@ -90,7 +85,6 @@ pub fn train(
             people: learnt.map(<[_]>::len),
             samples: settings.steps * settings.batch,
             goes_on: job.from.is_some(),
-            extras_alone: settings.extras_alone,
             score: score.unwrap_or_default(),
         };
         let card = pose::card(&settings.shape, &about);

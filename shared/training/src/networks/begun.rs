@@ -1,7 +1,5 @@
 //! The parameters of a previously trained network, from which a new training run starts.
 
-use std::collections::BTreeMap;
-
 use inference::onnx::value_of_half;
 use rten_onnx::onnx::{DataType, ModelProto, TensorProto};
 
@@ -45,48 +43,25 @@ pub enum BeginError {
     },
 }
 
-/// A trained network from which a training run starts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Begun {
-    /// Parameters, in the order of the untrained network's parameters.
-    pub parameters: Vec<Parameter>,
-    /// Values of the constants in the file, by the names of the corresponding parameters.
-    pub constants: BTreeMap<String, Vec<f32>>,
-}
-
-/// Reads the parameters of a network that this crate wrote.
+/// Reads the parameters of a network that this crate wrote, in the order of the untrained network's parameters.
 ///
 /// The weights in the file are standardised. The length of every channel's weight vector becomes the gain of the channel. The weights are
 /// then scaled to the length that they have at the beginning of a training run. The resulting network gives the same output as the file,
 /// except for rounding.
 ///
 /// * `all`: the untrained parameters of the network. They are kept for channels that are 0 in the file.
-/// * `may_lack`: prefix of the names of layers that the file may lack; these layers stay untrained.
 ///
 /// # Errors
 ///
 /// Fails with [`BeginError`].
-pub(crate) fn begun(
-    mut all: Vec<Parameter>,
-    may_lack: Option<&str>,
-    file: &[u8],
-) -> Result<Begun, BeginError> {
+pub(crate) fn begun(mut all: Vec<Parameter>, file: &[u8]) -> Result<Vec<Parameter>, BeginError> {
     let graph = ModelProto::parse_buf(file)?.graph.unwrap_or_default();
     let constants = graph.initializer;
-    let mut kept = BTreeMap::new();
     for at in 0..all.len() {
         if is_gain(&all[at]) {
             continue;
         }
-        let values = match numbers(&constants, &all[at]) {
-            Err(BeginError::Missing { name, .. })
-                if may_lack.is_some_and(|layers| name.starts_with(layers)) =>
-            {
-                continue;
-            }
-            read => read?,
-        };
-        kept.insert(all[at].name.clone(), values.clone());
+        let values = numbers(&constants, &all[at])?;
         let (these, next) = all.split_at_mut(at + 1);
         let own = &mut these[at].values;
         match next.first_mut().filter(|next| is_gain(next)) {
@@ -95,10 +70,7 @@ pub(crate) fn begun(
             None => *own = values,
         }
     }
-    Ok(Begun {
-        parameters: all,
-        constants: kept,
-    })
+    Ok(all)
 }
 
 fn is_gain(parameter: &Parameter) -> bool {

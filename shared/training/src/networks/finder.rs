@@ -17,7 +17,7 @@ mod settings;
 mod task;
 mod vary;
 
-pub use crate::networks::begun::{BeginError, Begun};
+pub use crate::networks::begun::BeginError;
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
 pub use network::{BOXES, CHANNELS, PICTURE, STRIDE, Shape, begun, initial};

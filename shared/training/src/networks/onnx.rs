@@ -1,7 +1,5 @@
 //! A trained network as an ONNX file.
 
-use std::collections::BTreeMap;
-
 use inference::onnx::{Attribute, Network as Graph, Side};
 
 use crate::networks::ops::{
@@ -18,8 +16,6 @@ pub struct Document {
     pub metadata: Vec<(String, String)>,
     /// True if weights are stored in half precision.
     pub has_half_weights: bool,
-    /// Weights of layers by name. They are written instead of the weights computed from the parameters.
-    pub kept: BTreeMap<String, Vec<f32>>,
 }
 
 /// Writes a network. Standardised weights become plain weights, batch normalisation is merged into the convolutions, and dropout is
@@ -41,7 +37,6 @@ pub fn write(network: &impl Network, parameters: &[Parameter], document: Documen
             ..Graph::default()
         },
         has_half_weights: document.has_half_weights,
-        kept: document.kept,
         inputs,
         parameters: parameters.iter(),
         n: 0,
@@ -88,7 +83,6 @@ struct Folded {
 struct Writer<'a> {
     graph: Graph,
     has_half_weights: bool,
-    kept: BTreeMap<String, Vec<f32>>,
     inputs: Vec<(&'static str, Dims)>,
     parameters: core::slice::Iter<'a, Parameter>,
     n: usize,
@@ -116,7 +110,6 @@ impl<'a> Writer<'a> {
     }
 
     fn weights(&mut self, name: &str, dims: &[usize], values: Vec<f32>) {
-        let values = self.kept.remove(name).unwrap_or(values);
         if self.has_half_weights {
             self.graph.halves(name, dims, &values);
         } else {

@@ -13,6 +13,7 @@
 //!
 //! Pixels have their centres at integers.
 
+mod beside;
 mod card;
 mod cost;
 mod marks;
@@ -22,8 +23,9 @@ mod score;
 mod settings;
 mod task;
 mod vary;
+mod window;
 
-pub use crate::networks::begun::{BeginError, Begun};
+pub use crate::networks::begun::BeginError;
 pub use card::{About, card};
 pub use cost::{Cost, Truth};
 pub use marks::{Marks, exchange_sides};
@@ -34,8 +36,9 @@ pub use person::{Person, SIDE, Source, Target, WINDOW};
 pub use score::{Judged, Score};
 pub use settings::{Settings, Vary};
 pub use task::{Found, PoseTask, TooFew, file};
-pub use vary::{DEVIATION, FILL, MARGIN, MEAN, NetworkSample, plain, varied};
+pub use vary::{DEVIATION, MEAN, NetworkSample, plain, varied};
 pub(in crate::networks) use vary::{coarsen, recolour};
+pub use window::{FILL, MARGIN};
 
 /// For each keypoint, the keypoint that is its mirror image.
 pub const MIRROR: [usize; N_KEYPOINTS] = [

@@ -4,7 +4,7 @@
 //! person's box. It also has the natural logarithms of the distances from the centre of the cell to the left, top, right and
 //! bottom of that box, in cells.
 
-use crate::networks::begun::{self, BeginError, Begun};
+use crate::networks::begun::{self, BeginError};
 use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, plain, with_gain};
@@ -113,6 +113,6 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 /// # Errors
 ///
 /// Fails with [`BeginError`].
-pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
-    begun::begun(initial(shape, seed), None, file)
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, BeginError> {
+    begun::begun(initial(shape, seed), file)
 }

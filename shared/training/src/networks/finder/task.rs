@@ -10,7 +10,6 @@ use super::picture::Picture;
 use super::score::{Score, Tally};
 use super::settings::Settings;
 use super::vary::{FinderSample, plain, varied};
-use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Schedule, Step};
@@ -45,7 +44,6 @@ fn document(metadata: &[(String, String)]) -> Document {
         name: "boxes".to_owned(),
         metadata: metadata.to_vec(),
         has_half_weights: true,
-        ..Document::default()
     }
 }
 
@@ -66,7 +64,7 @@ pub struct FinderTask<'a> {
     learnt: &'a [Picture],
     kept: &'a [Picture],
     card: DetectorCard,
-    from: Option<Begun>,
+    from: Option<Vec<Parameter>>,
     stamp: u64,
 }
 
@@ -86,7 +84,7 @@ impl<'a> FinderTask<'a> {
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Picture]; 2],
-        from: Option<Begun>,
+        from: Option<Vec<Parameter>>,
     ) -> Result<Self, NobodyShown> {
         if learnt.is_empty() || kept.is_empty() {
             let [learnt, kept] = [learnt.len(), kept.len()];
@@ -100,7 +98,7 @@ impl<'a> FinderTask<'a> {
             learnt,
             kept,
             card,
-            stamp: stamp(settings, [learnt, kept], from.as_ref()),
+            stamp: stamp(settings, [learnt, kept], from.as_deref()),
             from,
         })
     }
@@ -159,8 +157,9 @@ impl Task for FinderTask<'_> {
     }
 
     fn begin(&self) -> Vec<Parameter> {
-        let from = self.from.as_ref().map(|from| from.parameters.clone());
-        from.unwrap_or_else(|| initial(&self.settings.shape, self.settings.seed))
+        self.from
+            .clone()
+            .unwrap_or_else(|| initial(&self.settings.shape, self.settings.seed))
     }
 
     fn seed(&self) -> u64 {
@@ -289,13 +288,13 @@ fn shown(seen: &[FinderSample]) -> Shown {
 }
 
 /// Hash of everything that the result depends on.
-fn stamp(settings: &Settings, pictures: [&[Picture]; 2], from: Option<&Begun>) -> u64 {
+fn stamp(settings: &Settings, pictures: [&[Picture]; 2], from: Option<&[Parameter]>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for picture in pictures.into_iter().flatten() {
         bytes.extend(formats::checksum::fnv1a(&picture.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", picture.size, picture.people).into_bytes());
     }
-    let from = from.into_iter().flat_map(|from| &from.parameters);
+    let from = from.into_iter().flatten();
     for value in from.flat_map(|list| &list.values) {
         bytes.extend(value.to_bits().to_le_bytes());
     }

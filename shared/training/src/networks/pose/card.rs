@@ -4,7 +4,8 @@ use skeleton::PARSE14;
 
 use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
-use super::vary::{DEVIATION, FILL, MARGIN, MEAN};
+use super::vary::{DEVIATION, MEAN};
+use super::window::{FILL, MARGIN};
 
 /// Information for a card about the training.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -15,8 +16,6 @@ pub struct About {
     pub samples: usize,
     /// True if the training started from a previously trained network.
     pub goes_on: bool,
-    /// True if only the extra keypoints (nose, heels and big toes) were trained.
-    pub extras_alone: bool,
     /// Quality of the network on the held-out people.
     pub score: Score,
 }
@@ -35,12 +34,10 @@ pub fn card(shape: &Shape, about: &About) -> String {
     let [mean_of_ends, both_ends, front, extras] =
         [mean_of_ends, both_ends, front, extras].map(|share| 100.0 * share);
     let Shape { width, height, .. } = shape;
-    let before = match (about.goes_on, about.extras_alone) {
-        (true, true) => {
-            ", for the extra keypoints alone; all other parts are those of the network from which it started"
-        }
-        (true, false) => ", after those of the network from which it started",
-        (false, _) => "",
+    let before = if about.goes_on {
+        ", after those of the network from which it started"
+    } else {
+        ""
     };
     let names: Vec<String> = names().map(|name| format!("{name:?}")).collect();
     let names = names.join(", ");

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::network::{N_JOINTS, N_KEYPOINTS, STRIDE};
+use super::network::STRIDE;
 use super::peak;
 
 /// Range to which the logarithm of an expected error is clamped.
@@ -57,16 +57,6 @@ impl Truth {
     /// Number of columns and rows of the maps for an input of some width and height.
     pub(super) fn cells([width, height]: [usize; 2]) -> [usize; 2] {
         [width, height].map(|side| side / STRIDE)
-    }
-
-    /// Sets the weights of the joints to zero, so that only the extra keypoints are trained.
-    pub(super) fn forget_joints(&mut self) {
-        for weights in self.weights.as_chunks_mut::<N_KEYPOINTS>().0 {
-            weights[..N_JOINTS].fill(0.0);
-        }
-        for places in self.places.as_chunks_mut::<{ 2 * N_KEYPOINTS }>().0 {
-            places[..2 * N_JOINTS].fill(f32::NAN);
-        }
     }
 
     /// Cross-entropy of the maps, in which cells of heat 1 have ten times the weight. It is a mean over joints, relative to `CELLS`.
@@ -147,6 +137,7 @@ impl Truth {
 mod tests {
     use fastrand::Rng;
 
+    use super::super::network::N_KEYPOINTS;
     use super::*;
 
     /// Checks that the gradient of a part of the cost matches the change of the cost with every output.

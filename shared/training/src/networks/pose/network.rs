@@ -8,7 +8,7 @@
 
 use skeleton::PARSE14;
 
-use crate::networks::begun::{BeginError, Begun};
+use crate::networks::begun::BeginError;
 use crate::networks::ops::{Dims, Network, Ops, Output};
 use crate::networks::parameters::{self, Parameter};
 use crate::networks::trunk::{Trunk, block, plain, with_gain};
@@ -25,8 +25,6 @@ pub const EXTRAS: [&str; 5] = [
 ];
 /// Number of keypoints with a map: the joints, then [`EXTRAS`].
 pub const N_KEYPOINTS: usize = N_JOINTS + EXTRAS.len();
-/// Prefix of the names of layers used only for the extra keypoints.
-pub(crate) const OF_EXTRAS: &str = "extra_";
 
 /// Pixels of the input per cell of the maps.
 pub const STRIDE: usize = 4;
@@ -144,16 +142,14 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
 
 /// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
 ///
-/// If the file lacks the layers of the [extra keypoints](EXTRAS), these layers stay untrained.
-///
 /// * `shape`: sizes of the network. Width and height of the input may differ from those of the file.
 /// * `seed`: seed for the initial weights of channels whose weights in the file are all 0.
 ///
 /// # Errors
 ///
 /// Fails with [`BeginError`].
-pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Begun, BeginError> {
-    crate::networks::begun::begun(initial(shape, seed), Some(OF_EXTRAS), file)
+pub fn begun(shape: &Shape, seed: u64, file: &[u8]) -> Result<Vec<Parameter>, BeginError> {
+    crate::networks::begun::begun(initial(shape, seed), file)
 }
 
 /// Runs the network. Returns the maps, the evidence for the direction, and the logarithms of the expected errors.
@@ -181,7 +177,7 @@ fn run<O: Ops>(ops: &mut O, shape: &Shape) -> Vec<O::Value> {
     let head = with_gain(0.1, plain(EXTRAS.len(), 1, 1));
     let extras = ops.conv(&own, "extra_maps", head);
     let places = ops.fixed(&extras);
-    let keypoints = (OF_EXTRAS, [shape.hidden, EXTRAS.len()]);
+    let keypoints = ("extra_", [shape.hidden, EXTRAS.len()]);
     let of_extras = error(ops, keypoints, [&own, &places, &overall]);
     let maps = ops.join(&[&maps, &extras]);
     let errors = ops.join(&[&errors, &of_extras]);

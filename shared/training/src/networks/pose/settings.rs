@@ -32,8 +32,6 @@ pub struct Settings {
     pub longest: f32,
     /// Share of the running mean of the parameters that is replaced in every step.
     pub averaged: f32,
-    /// True to train only the extra keypoints. All other parameters in the file stay as in the network from which the training starts.
-    pub extras_alone: bool,
     /// Weight of the direction relative to the maps.
     pub front: f32,
     /// Weight of the expected error relative to the maps.
@@ -56,6 +54,10 @@ pub struct Vary {
     pub scale: f32,
     /// Standard deviation of the shift of the window, in heights of the window.
     pub shift: f32,
+    /// Share of samples with a window beside the person, in which no joint is to be found.
+    pub empty: f32,
+    /// Share of samples to which a second person is added.
+    pub beside: f32,
     /// Share of samples that are partly covered.
     pub covered: f32,
     /// Share of samples whose resolution is reduced.
@@ -72,6 +74,8 @@ impl Default for Vary {
             turn: 20.0,
             scale: 0.16,
             shift: 0.05,
+            empty: 0.08,
+            beside: 0.3,
             covered: 0.35,
             coarse: 0.25,
             grey: 0.1,
@@ -93,7 +97,6 @@ impl Default for Settings {
             decay: 0.05,
             longest: 1.0,
             averaged: 0.002,
-            extras_alone: false,
             front: 0.3,
             error: 0.1,
             vary: Vary::default(),
@@ -139,6 +142,8 @@ impl Settings {
             from_zero("vary.turn", vary.turn, 360.0),
             from_zero("vary.scale", vary.scale, 1.0),
             from_zero("vary.shift", vary.shift, 1.0),
+            from_zero("vary.empty", vary.empty, 1.0),
+            from_zero("vary.beside", vary.beside, 1.0),
             from_zero("vary.covered", vary.covered, 1.0),
             from_zero("vary.coarse", vary.coarse, 1.0),
             from_zero("vary.grey", vary.grey, 1.0),

@@ -3,13 +3,12 @@
 use rayon::prelude::*;
 
 use super::cost::{Cost, Truth};
-use super::network::{N_KEYPOINTS, OF_EXTRAS, Shape, initial};
+use super::network::{N_KEYPOINTS, Shape, initial};
 use super::peak;
 use super::person::Person;
 use super::score::{Judged, Score};
 use super::settings::Settings;
 use super::vary::{NetworkSample, plain, varied};
-use crate::networks::begun::Begun;
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::{self, Document};
 use crate::networks::optimiser::{Rule, Schedule, Step};
@@ -48,7 +47,6 @@ fn document(metadata: &[(String, String)]) -> Document {
         name: "pose".to_owned(),
         metadata: metadata.to_vec(),
         has_half_weights: true,
-        ..Document::default()
     }
 }
 
@@ -121,7 +119,7 @@ pub struct PoseTask<'a> {
     settings: &'a Settings,
     learnt: Vec<&'a Person>,
     kept: KeptApart<'a>,
-    from: Option<Begun>,
+    from: Option<Vec<Parameter>>,
     stamp: u64,
 }
 
@@ -137,7 +135,7 @@ impl<'a> PoseTask<'a> {
     pub fn new(
         settings: &'a Settings,
         [learnt, kept]: [&'a [Person]; 2],
-        from: Option<Begun>,
+        from: Option<Vec<Parameter>>,
     ) -> Result<Self, TooFew> {
         if learnt.is_empty() || kept.is_empty() {
             let [learnt, kept] = [learnt.len(), kept.len()];
@@ -145,7 +143,7 @@ impl<'a> PoseTask<'a> {
         }
         Ok(Self {
             settings,
-            stamp: stamp(settings, [learnt, kept], from.as_ref()),
+            stamp: stamp(settings, [learnt, kept], from.as_deref()),
             learnt: learnt.iter().collect(),
             kept: KeptApart::new(kept),
             from,
@@ -212,8 +210,7 @@ impl Task for PoseTask<'_> {
 
     fn begin(&self) -> Vec<Parameter> {
         let begin = || initial(&self.settings.shape, self.settings.seed);
-        let from = self.from.as_ref().map(|from| from.parameters.clone());
-        from.unwrap_or_else(begin)
+        self.from.clone().unwrap_or_else(begin)
     }
 
     fn seed(&self) -> u64 {
@@ -244,10 +241,8 @@ impl Task for PoseTask<'_> {
 
     fn learned(&self, nth: usize, parameters: &[Parameter]) -> Vec<bool> {
         let is_learned = |parameter: &Parameter| {
-            let of_extras = parameter.name.strip_prefix(OF_EXTRAS);
-            let layer = of_extras.unwrap_or(&parameter.name);
-            let is_now = !self.is_for_error(nth) || layer.starts_with("error");
-            is_now && (of_extras.is_some() || !self.settings.extras_alone)
+            let layer = parameter.name.trim_start_matches("extra_");
+            !self.is_for_error(nth) || layer.starts_with("error")
         };
         parameters.iter().map(is_learned).collect()
     }
@@ -276,13 +271,9 @@ impl Task for PoseTask<'_> {
             .into_par_iter()
             .filter_map(|at| self.sample(people, nth * n + at, &network))
             .collect();
-        let mut truth = truth(&seen, &network);
-        if self.settings.extras_alone {
-            truth.forget_joints();
-        }
         Batch {
             shown: shown(&seen),
-            truth,
+            truth: truth(&seen, &network),
             network,
         }
     }
@@ -352,13 +343,7 @@ impl Trainer<PoseTask<'_>> {
     ///
     /// * `metadata`: keys and values of the file's metadata.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
-        let mut document = document(metadata);
-        let PoseTask { settings, from, .. } = self.task();
-        if let Some(from) = from.as_ref().filter(|_| settings.extras_alone) {
-            document.kept.clone_from(&from.constants);
-            document.kept.retain(|name, _| !name.starts_with(OF_EXTRAS));
-        }
-        self.file(document)
+        self.file(document(metadata))
     }
 }
 
@@ -411,13 +396,13 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
 }
 
 /// Hash of everything that the result depends on.
-fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&Begun>) -> u64 {
+fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
     let mut bytes = format!("{settings:?}").into_bytes();
     for person in people.into_iter().flatten() {
         bytes.extend(formats::checksum::fnv1a(&person.rgb).to_le_bytes());
         bytes.extend(format!("{:?}{:?}", person.targets, person.front).into_bytes());
     }
-    let from = from.into_iter().flat_map(|from| &from.parameters);
+    let from = from.into_iter().flatten();
     for value in from.flat_map(|list| &list.values) {
         bytes.extend(value.to_bits().to_le_bytes());
     }

@@ -2,22 +2,21 @@
 
 use fastrand::Rng;
 
+use super::beside::add_beside;
 use super::network::{N_KEYPOINTS, STRIDE, Shape};
 use super::person::{Person, SIDE, Target};
 use super::settings::Vary;
+use super::window::{View, colour, pixels, view};
 use super::{MIRROR, exchange_sides};
 use crate::networks::parameters::normal;
 
-/// Factor by which the box around the joints is enlarged. The network's card gives this factor to programs that use the network.
-pub const MARGIN: f32 = 1.25;
-/// Margin for hands, feet and hair beyond the joints, on each side, as a share of the longer side.
-const BEYOND: f32 = 0.05;
-/// Colour outside the picture.
-pub const FILL: f32 = 110.0;
 /// Value subtracted from a colour before it is divided by [`DEVIATION`].
 pub const MEAN: f32 = 110.0;
 /// Value by which a colour is divided after [`MEAN`] is subtracted.
 pub const DEVIATION: f32 = 60.0;
+/// Shift of a window in which nobody is in the middle, in heights of the window: from the smallest to the largest. Half the width of the
+/// window is 0.4 heights.
+const ASIDE: [f32; 2] = [0.42, 0.6];
 /// Random values are limited to this number of standard deviations.
 const MOST: f32 = 2.5;
 
@@ -36,63 +35,14 @@ pub struct NetworkSample {
     pub places: [[f32; 2]; N_KEYPOINTS],
 }
 
-/// Mapping of a picture to the input: it is rotated, moved, scaled, and possibly mirrored.
-#[derive(Debug, Clone, Copy)]
-struct View {
-    /// Cosine and sine of the angle by which the picture is rotated.
-    turn: [f32; 2],
-    /// Centre of the window in the rotated picture, in pixels. The origin is the centre of the picture.
-    centre: [f32; 2],
-    /// Pixels of the picture per pixel of the input.
-    step: f32,
-    size: [usize; 2],
-    is_mirrored: bool,
-}
-
-impl View {
-    fn turned(&self, at: [f32; 2]) -> [f32; 2] {
-        turned(at, self.turn)
+impl NetworkSample {
+    /// Changes the truth to that of a window in which nobody is in the middle: no map has heat.
+    fn forget_person(&mut self) {
+        self.maps.fill(0.0);
+        self.weights = [1.0; N_KEYPOINTS];
+        self.front = [0.0; 2];
+        self.places = [[f32::NAN; 2]; N_KEYPOINTS];
     }
-
-    /// Converts a point of the picture to the input.
-    fn in_input(&self, at: [f32; 2]) -> [f32; 2] {
-        let at = self.turned(at);
-        let [x, y] = [0, 1]
-            .map(|axis| (at[axis] - self.centre[axis]) / self.step + 0.5 * self.size[axis] as f32);
-        if self.is_mirrored {
-            [(self.size[0] - 1) as f32 - x, y]
-        } else {
-            [x, y]
-        }
-    }
-
-    /// Converts a point of the input to the picture.
-    fn in_picture(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        let x = if self.is_mirrored {
-            (self.size[0] - 1) as f32 - x
-        } else {
-            x
-        };
-        let at = [x, y];
-        let [x, y] = [0, 1]
-            .map(|axis| self.centre[axis] + (at[axis] - 0.5 * self.size[axis] as f32) * self.step);
-        let [cosine, sine] = self.turn;
-        let middle = middle();
-        [
-            cosine * x + sine * y + middle,
-            -sine * x + cosine * y + middle,
-        ]
-    }
-}
-
-fn middle() -> f32 {
-    0.5 * (SIDE - 1) as f32
-}
-
-/// Rotates a point of the picture about the picture's centre, which becomes the origin.
-fn turned(at: [f32; 2], [cosine, sine]: [f32; 2]) -> [f32; 2] {
-    let [x, y] = at.map(|side| side - middle());
-    [cosine * x - sine * y, sine * x + cosine * y]
 }
 
 /// A sample as the network normally gets it: the person, cut out along the box around the joints, without random variation.
@@ -103,7 +53,7 @@ pub fn plain(person: &Person, shape: &Shape) -> Option<NetworkSample> {
 
 /// A randomly varied sample of a person.
 ///
-/// * `other`: another person, who may cover parts of this one.
+/// * `other`: another person, who may be beside this one, or cover parts of this one.
 pub fn varied(
     person: &Person,
     other: &Person,
@@ -118,7 +68,12 @@ pub fn varied(
     };
     let angle = degrees.to_radians();
     let scale = (vary.scale * normal(rng).clamp(-MOST, MOST)).exp();
-    let shift = [0; 2].map(|_| vary.shift * normal(rng).clamp(-MOST, MOST));
+    let mut shift = [0; 2].map(|_| vary.shift * normal(rng).clamp(-MOST, MOST));
+    let is_empty = rng.f32() < vary.empty;
+    if is_empty {
+        let [least, most] = ASIDE;
+        shift[0] = (least + (most - least) * rng.f32()) * if rng.bool() { 1.0 } else { -1.0 };
+    }
     let is_mirrored = rng.bool();
     let view = view(
         person,
@@ -127,6 +82,9 @@ pub fn varied(
         (scale, shift, is_mirrored),
     )?;
     let mut rgb = pixels(person, &view);
+    if rng.f32() < vary.beside {
+        add_beside(&mut rgb, (person, &view), (other, shape), rng);
+    }
     if rng.f32() < vary.covered {
         cover(&mut rgb, other, view.size, rng);
     }
@@ -134,7 +92,11 @@ pub fn varied(
         coarsen(&mut rgb, view.size, rng.usize(2..=3));
     }
     recolour(&mut rgb, vary.grey, rng);
-    Some(sample(person, shape, &view, &rgb))
+    let mut sample = sample(person, shape, &view, &rgb);
+    if is_empty {
+        sample.forget_person();
+    }
+    Some(sample)
 }
 
 /// The angle between the trunk and upright, clockwise in the picture, in radians; 0 if the trunk is unknown.
@@ -142,79 +104,6 @@ fn lean(person: &Person) -> f32 {
     let [x, y] = person.trunk();
     let angle = x.atan2(-y);
     if angle.is_finite() { angle } else { 0.0 }
-}
-
-/// The window around the joints; `None` if the joints are almost at the same point.
-fn view(
-    person: &Person,
-    shape: &Shape,
-    turn: [f32; 2],
-    (scale, shift, is_mirrored): (f32, [f32; 2], bool),
-) -> Option<View> {
-    let mut low = [f32::INFINITY; 2];
-    let mut high = [f32::NEG_INFINITY; 2];
-    for at in person.places() {
-        let at = turned(at, turn);
-        for axis in 0..2 {
-            low[axis] = low[axis].min(at[axis]);
-            high[axis] = high[axis].max(at[axis]);
-        }
-    }
-    let longer = (high[0] - low[0]).max(high[1] - low[1]);
-    if !(longer.is_finite() && longer > 8.0) {
-        return None;
-    }
-    let size = [shape.width, shape.height];
-    let sides = [0, 1].map(|axis| (high[axis] - low[axis] + 2.0 * BEYOND * longer) * MARGIN);
-    let steps = [0, 1].map(|axis| sides[axis] / size[axis] as f32);
-    let step = steps[0].max(steps[1]) * scale;
-    let height = step * size[1] as f32;
-    let centre = [0, 1].map(|axis| f32::midpoint(low[axis], high[axis]) + shift[axis] * height);
-    Some(View {
-        turn,
-        centre,
-        step,
-        size,
-        is_mirrored,
-    })
-}
-
-/// The pixels of the window, interpolated: `[height][width]`, red first, 0 to 255.
-fn pixels(person: &Person, view: &View) -> Vec<[f32; 3]> {
-    let [width, height] = view.size;
-    let mut all = Vec::with_capacity(width * height);
-    for row in 0..height {
-        for column in 0..width {
-            let at = view.in_picture([column as f32, row as f32]);
-            all.push(colour(&person.rgb, at));
-        }
-    }
-    all
-}
-
-/// Interpolates the colour between four pixels.
-fn colour(rgb: &[u8], [x, y]: [f32; 2]) -> [f32; 3] {
-    let (left, top) = (x.floor(), y.floor());
-    let [right, below] = [x - left, y - top];
-    let mut sum = [0.0; 3];
-    for (dy, of_row) in [(0, 1.0 - below), (1, below)] {
-        for (dx, of_column) in [(0, 1.0 - right), (1, right)] {
-            let [column, row] = [left as i32 + dx, top as i32 + dy];
-            let weight = of_row * of_column;
-            let side = 0..SIDE as i32;
-            let is_inside = side.contains(&column) && side.contains(&row);
-            let at = 3 * (row.max(0) as usize * SIDE + column.max(0) as usize);
-            for (channel, sum) in sum.iter_mut().enumerate() {
-                let value = if is_inside {
-                    f32::from(rgb[at + channel])
-                } else {
-                    FILL
-                };
-                *sum += weight * value;
-            }
-        }
-    }
-    sum
 }
 
 /// Covers a rectangle with one colour, or with a part of another person.

@@ -348,7 +348,6 @@ impl Trainer<QualityTask<'_>> {
             name: kind.name().to_owned(),
             metadata: entries.map(|(key, value)| (key.to_owned(), value)).collect(),
             has_half_weights: false,
-            ..Document::default()
         })
     }
 }

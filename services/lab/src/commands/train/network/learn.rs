@@ -10,17 +10,16 @@ use lab::posetraining::{self, Job};
 use terminal::{Globals, Terminal};
 use training::networks::pose::Settings;
 
-use crate::commands::train::learning::{Learning, named};
+use crate::commands::train::learning::Learning;
 
 const HELP: &str = "\
-PEOPLE is a file of `parallax-lab train network-people`. The network finds 14 joints, the nose, the heels and the big toes. It also finds the direction \
+PEOPLE are files of `parallax-lab train network-people`. The network finds 14 joints, the nose, the heels and the big toes. It also finds the direction \
 of the trunk and an expected error of each joint. Left and right are sides of the picture. The ONNX file contains the network's card.
 
 After every hundred steps, the state of the training is saved in OUT.checkpoint. After Ctrl-C or a kill, \
 --resume continues from there. The resulting network is the same, bit for bit, on machines of the same kind.
 
---from FILE continues the training of a network; use a lower `rate` in --settings for this. --from shipped continues from the shipped network. \
-With `extras_alone = true` in --settings, only the nose, heels and big toes are learned. The rest of the network does not change.
+--from FILE continues the training of a network; use a lower `rate` in --settings for this. --from shipped continues from the shipped network.
 
 The built-in training needs no other software. A build with LibTorch can be faster \
 (--features libtorch; see docs/guide/train.md).
@@ -37,7 +36,7 @@ Example:
 pub(crate) struct Arguments {
     /// Files of people, prepared by `train network-people`.
     #[arg(value_name = "PEOPLE", required_unless_present = "print_settings")]
-    people: Option<PathBuf>,
+    people: Vec<PathBuf>,
     #[command(flatten)]
     learning: Learning,
     /// Network from this command, with which to start instead of random weights. Use it to train for more steps, or to add your own people.
@@ -62,7 +61,10 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         from: arguments.from.as_deref().map(from).transpose()?,
         ..learning.job()?
     };
-    let people = posetraining::read(named(arguments.people.as_deref()))?;
+    let mut people = posetraining::Prepared::default();
+    for file in &arguments.people {
+        people.append(posetraining::read(file)?);
+    }
     let passes = posetraining::train((&job, &settings), &people, (&stop, &terminal))?;
     learning.report(&passes)?;
     Ok(ExitCode::SUCCESS)

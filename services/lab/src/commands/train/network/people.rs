@@ -19,7 +19,7 @@ const BAR: &str = "{elapsed_precise} {prefix} {bar:20} {pos}/{len} {msg}";
 
 const HELP: &str = "\
 The people come from two sources: DATASETs of annotated people as for `parallax-lab train fmp`, and synthetic scenes (--scenes N) with exact joints \
-and directions. For each person, the file contains a picture of 256 x 256 pixels and the joints; left and right are sides of the picture. \
+and directions, in which up to four other people stand or walk. For each person, the file contains a picture of 256 x 256 pixels and the joints; left and right are sides of the picture. \
 The direction in which a person faces is computed from the marks, if left and right are sides of the body \
 (LSP; for PARSE pass --sides PARSE=seen).
 
@@ -72,6 +72,9 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
+/// Largest number of other people in a scene who stand around, and who walk past.
+const COMPANY: u64 = 2;
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
@@ -95,7 +98,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
             n: arguments.scenes,
             subjects: arguments.subjects,
             frames: arguments.frames,
-            company: 0,
+            company: COMPANY,
             backdrop: arguments.backdrop.clone(),
             seed: arguments.seed,
         },
