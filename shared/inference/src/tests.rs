@@ -68,7 +68,7 @@ fn the_included_network_runs_in_parallax_and_gives_the_results_of_rten() {
 fn batches_of_pictures_are_run_by_rten() {
     let session = Session::parse(SHIPPED.to_vec()).unwrap();
     let outputs = run(&session, &[2, 3, 160, 128], 1).unwrap();
-    assert_eq!(outputs[0].len(), 2 * 14 * 40 * 32);
+    assert_eq!(outputs[0].len(), 2 * 19 * 40 * 32);
 }
 
 /// A network under construction.
