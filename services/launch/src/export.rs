@@ -9,8 +9,8 @@ mod pictures;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use exports::Trial;
 use exports::{FILES, FileFormat, Notes, ViewCamera};
-pub use exports::{Naming, Trial};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use serde_json::{Value, json};
 
@@ -22,6 +22,8 @@ use pictures::Pictures;
 pub enum Format {
     /// A format with one file for all views.
     File(&'static FileFormat),
+    /// Points, markers and settings for `OpenSim`: a folder with several files for every person.
+    OpenSim,
     /// Keypoints of the reprojected pose, with a file for every view and frame.
     OpenPose,
     /// A video of every view, with the pose drawn on it.
@@ -32,13 +34,14 @@ impl Format {
     /// Returns all formats.
     pub fn all() -> Vec<Self> {
         let files = FILES.iter().map(Self::File);
-        files.chain([Self::OpenPose, Self::Mp4]).collect()
+        files.chain([Self::OpenSim, Self::OpenPose, Self::Mp4]).collect()
     }
 
     /// Returns the name of the format.
     pub fn name(self) -> &'static str {
         match self {
             Self::File(format) => format.name,
+            Self::OpenSim => "opensim",
             Self::OpenPose => "openpose",
             Self::Mp4 => "mp4",
         }
@@ -48,12 +51,16 @@ impl Format {
         match self {
             Self::File(format) => format.needs.rate,
             Self::OpenPose => false,
-            Self::Mp4 => true,
+            Self::OpenSim | Self::Mp4 => true,
         }
     }
 
     fn needs_up(self) -> bool {
-        matches!(self, Self::File(format) if format.needs.up)
+        match self {
+            Self::File(format) => format.needs.up,
+            Self::OpenSim => true,
+            Self::OpenPose | Self::Mp4 => false,
+        }
     }
 
     fn needs_cameras(self) -> bool {
@@ -150,6 +157,11 @@ pub fn export(
                     written.push(file(trial, format, path)?);
                 }
             }
+            Format::OpenSim => {
+                for (path, trial) in paths.iter().zip(trials) {
+                    written.push(opensim(trial, path)?);
+                }
+            }
             Format::OpenPose => {
                 written.push(per_view::openpose(
                     trials, &cameras, &paths[0], stop, console,
@@ -234,12 +246,16 @@ fn check(origin: &Origin, job: &Job) -> Result<(), Failure> {
 /// Returns the paths of a format. If there are several people, a format with one file per person has the person's number in the names.
 fn paths(format: Format, job: &Job, trials: &[Trial], pictures: &[Pictures]) -> Vec<PathBuf> {
     let name = |suffix: &str| job.out.join(format!("{}{suffix}", job.name));
+    let of_people = |suffix: &str| -> Vec<PathBuf> {
+        if trials.len() == 1 {
+            return vec![name(suffix)];
+        }
+        let ids = trials.iter().map(Trial::id);
+        ids.map(|id| name(&format!("-person{id}{suffix}"))).collect()
+    };
     match format {
-        Format::File(format) if trials.len() == 1 => vec![name(format.suffix)],
-        Format::File(format) => trials
-            .iter()
-            .map(|trial| name(&format!("-person{}{}", trial.id(), format.suffix)))
-            .collect(),
+        Format::File(format) => of_people(format.suffix),
+        Format::OpenSim => of_people("-opensim"),
         Format::OpenPose => vec![name("-openpose")],
         Format::Mp4 => {
             let views = pictures.iter();
@@ -259,13 +275,35 @@ fn refuse_existing(format: Format, path: &Path, force: bool) -> Result<(), Failu
             failure.with_hint("choose another folder with --out, or pass --force to replace it")
         );
     }
-    let is_folder = matches!(format, Format::OpenPose);
+    let is_folder = matches!(format, Format::OpenSim | Format::OpenPose);
     if found.is_dir() != is_folder {
         let kind = if found.is_dir() { "a folder" } else { "a file" };
         let message = format!("{name} is {kind}, and is not replaced");
         return Err(Failure::new(ExitKind::Usage, message));
     }
     Ok(())
+}
+
+/// Writes the files for `OpenSim` into a folder. Other files in the folder stay.
+fn opensim(trial: &Trial, folder: &Path) -> Result<Written, Failure> {
+    std::fs::create_dir_all(folder).map_err(|error| cannot_write(folder, &error))?;
+    for (name, text) in exports::opensim::files(trial).or_fail(ExitKind::Run)? {
+        let path = folder.join(name);
+        files::replace(&path, text.as_bytes()).map_err(|error| cannot_write(&path, &error))?;
+    }
+    let mut notes = vec![format!(
+        "copy a full-body model to {}; then run scaling.xml and kinematics.xml in this folder",
+        folder.join(exports::opensim::MODEL).display()
+    )];
+    if !trial.names().any(|name| name == "left heel") {
+        notes.push("without heels and toes, the angles of the ankles are undetermined".to_owned());
+    }
+    Ok(Written {
+        format: "opensim",
+        path: folder.to_owned(),
+        about: ["m", "y up", "NaN", "none"],
+        notes,
+    })
 }
 
 fn file(trial: &Trial, format: &'static FileFormat, path: &Path) -> Result<Written, Failure> {

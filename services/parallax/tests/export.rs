@@ -235,32 +235,32 @@ fn other_programs_can_open_exports_with_gaps_and_long_exports() {
 }
 
 #[test]
-fn joints_have_opensim_names_on_request() {
-    let case = Case::new("export-names", &[2; 2], PLAIN);
+fn the_files_for_opensim_name_the_same_markers_and_leave_other_files_in_the_folder() {
+    let case = Case::new("export-opensim", &[2; 2], PLAIN);
     let ended = case.start(&["run", "deployment.toml"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    assert!(
-        !case.path("out/pose3d.trc").exists(),
-        "nothing tells its rate"
-    );
-    let told = [
-        "--to",
-        "trc,c3d,csv,csv-long",
-        "--rate",
-        "20",
-        "--up",
-        "0,0,1",
-    ];
-    let said = done(&case, "out", &[&told[..], &["--names", "opensim"]].concat());
-    let trc = fs::read_to_string(case.path("out/export/pose3d.trc")).unwrap();
-    let trc = Trc::parse(&trc).unwrap().markers;
-    let c3d = C3d::parse(&fs::read(case.path("out/export/pose3d.c3d")).unwrap()).unwrap();
-    assert_eq!(trc[..3], ["RAnkle", "RKnee", "RHip"]);
-    assert_eq!((c3d.labels(), &said["points"]), (&trc[..], &json!(trc)));
-    for (file, due) in [("pose3d.csv", "LWrist_x_m,"), ("pose3d-long.csv", ",Head,")] {
-        let text = fs::read_to_string(case.path("out/export").join(file)).unwrap();
-        assert!(text.contains(due), "{file}");
+    let told = ["--to", "opensim", "--rate", "20", "--up", "0,0,1"];
+    let said = done(&case, "out", &told);
+    let folder = case.path("out/export/pose3d-opensim");
+    let read = |name: &str| fs::read_to_string(folder.join(name)).unwrap();
+    let trc = Trc::parse(&read("markers.trc")).unwrap();
+    assert_eq!(trc.markers[..3], ["RAnkle", "RKnee", "RHip"]);
+    for file in ["markers.xml", "kinematics.xml"] {
+        for marker in &trc.markers {
+            assert!(
+                read(file).contains(&format!(" name=\"{marker}\"")),
+                "{file}: {marker}"
+            );
+        }
     }
+    let notes = said["files"][0]["notes"].to_string();
+    assert!(
+        notes.contains("model.osim") && notes.contains("ankles"),
+        "{notes}"
+    );
+    fs::write(folder.join("model.osim"), "mine").unwrap();
+    done(&case, "out", &[&told[..], &["--force"]].concat());
+    assert_eq!(read("model.osim"), "mine");
 }
 
 /// Checks `[frame][joint]` as read by another program, with null in gaps.

@@ -23,6 +23,7 @@ mod memory;
 mod networks;
 mod nonsense;
 mod one_process;
+mod opensim;
 mod parity;
 mod processes;
 mod programs;

@@ -3,7 +3,35 @@
 use nalgebra::Point3;
 
 use crate::Trial;
-use crate::naming::LANDMARKS;
+
+/// A landmark of the body, and the joints of the sets that represent it. The first joint that a set has is used.
+const LANDMARKS: [(&str, &[&str]); 15] = [
+    ("pelvis", &["pelvis", "torsoDistal"]),
+    ("neck", &["neck", "thorax", "torsoProximal"]),
+    ("head", &["head", "headDistal"]),
+    ("left shoulder", &["left shoulder", "upperLArmProximal"]),
+    ("left elbow", &["left elbow", "upperLArmDistal"]),
+    ("left wrist", &["left wrist", "lowerLArmDistal"]),
+    ("right shoulder", &["right shoulder", "upperRArmProximal"]),
+    ("right elbow", &["right elbow", "upperRArmDistal"]),
+    ("right wrist", &["right wrist", "lowerRArmDistal"]),
+    ("left hip", &["left hip", "upperLLegProximal"]),
+    ("left knee", &["left knee", "upperLLegDistal"]),
+    ("left ankle", &["left ankle", "lowerLLegDistal"]),
+    ("right hip", &["right hip", "upperRLegProximal"]),
+    ("right knee", &["right knee", "upperRLegDistal"]),
+    ("right ankle", &["right ankle", "lowerRLegDistal"]),
+];
+
+/// Returns the landmark of a joint of HumanEva-I's set, or any other name unchanged.
+pub(crate) fn plain_name(joint: &str) -> &str {
+    let is_humaneva = joint.contains(|letter: char| letter.is_ascii_uppercase());
+    let found = LANDMARKS
+        .iter()
+        .filter(|_| is_humaneva)
+        .find(|landmark| landmark.1.contains(&joint));
+    found.map_or(joint, |landmark| landmark.0)
+}
 
 /// Points of a trial that are landmarks.
 #[derive(Debug, Clone, PartialEq)]

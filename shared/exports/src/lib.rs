@@ -2,7 +2,7 @@
 //!
 //! [`Gathering`] takes the lines of a run one by one and makes a [`Trial`] of them. A trial has one entry for every instant at the frame
 //! rate, including instants without a frame (gaps). [`FILES`] is the table of formats with one file per trial. Two formats have a file for
-//! every view and frame ([`openpose`]) or pictures ([`annotate`]), and need a [`ViewCamera`].
+//! every view and frame ([`openpose`]) or pictures ([`annotate`]), and need a [`ViewCamera`]. [`opensim`] has several files per trial.
 //!
 //! | format | unit | axes | representation of a gap |
 //! |---|---|---|---|
@@ -12,6 +12,7 @@
 //! | `bvh` | cm | y up | the last rotation, and a note: the format has no gaps |
 //! | `csv`, `csv-long` | m | the rig's | empty cells |
 //! | `parquet` (a feature) | m | the rig's | null |
+//! | [`opensim`] | m | y up | NaN |
 //! | [`openpose`] | pixels of the footage | x right, y down | `0, 0, 0` |
 //!
 //! This crate opens no file, and does not smooth or fill data. Each format lists in its [`Notes`] what it cannot express.
@@ -21,7 +22,6 @@ pub mod report;
 mod trial;
 
 mod landmarks;
-mod naming;
 mod tree;
 
 mod format;
@@ -38,9 +38,9 @@ mod view;
 
 pub mod annotate;
 pub mod openpose;
+pub mod opensim;
 
 pub use format::{FILES, FileFormat, Needs};
-pub use naming::Naming;
 pub use sink::{Notes, Sink};
 pub use trial::{Gap, Gathering, Point, Slot, Trial, TrialError};
 pub use view::{Seen, ViewCamera};

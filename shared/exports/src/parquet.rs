@@ -52,7 +52,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
     let schema = Arc::new(parse_message_type(SCHEMA)?);
     let properties = Arc::new(WriterProperties::builder().build());
     let mut file = SerializedFileWriter::new(out, schema, properties)?;
-    let names = trial.written_names();
+    let names: Vec<&str> = trial.names().collect();
     for begin in (0..trial.slots.len()).step_by(GROUP) {
         let end = (begin + GROUP).min(trial.slots.len());
         let places = (begin..end).flat_map(|slot| (0..names.len()).map(move |nth| (slot, nth)));
@@ -71,7 +71,7 @@ fn write_all(trial: &Trial, out: &mut Sink<'_>) -> Result<(), ParquetError> {
         column::<Int64Type, _>(&mut group, &known, Some(&levels))?;
         texts(
             &mut group,
-            places.iter().map(|place| names[place.1].clone()),
+            places.iter().map(|place| names[place.1].to_owned()),
         )?;
         let point = |place: &(usize, usize)| trial.point(place.0, place.1);
         for axis in 0..3 {

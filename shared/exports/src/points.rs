@@ -69,11 +69,18 @@ pub(crate) fn c3d(trial: &Trial, mut out: &mut Sink<'_>) -> io::Result<Notes> {
 
 /// Writes TRC: metres, y up, like `pose3d.trc` of a run.
 pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
-    let labels: Vec<String> = trial
-        .labels()
-        .iter()
-        .map(|label| label.replace(['\t', '\n', '\r'], "_"))
-        .collect();
+    labelled_trc(trial, trial.labels(), out)?;
+    Ok(Notes::new())
+}
+
+/// Writes TRC with other names of the points.
+pub(crate) fn labelled_trc(
+    trial: &Trial,
+    labels: Vec<String>,
+    out: &mut Sink<'_>,
+) -> io::Result<()> {
+    let labels = labels.into_iter().map(|label| label.replace(['\t', '\n', '\r'], "_"));
+    let labels: Vec<String> = labels.collect();
     let heading = formats::trc::Heading {
         file_name: &format!("{}.trc", trial.name),
         rate_hz: rate(trial)?,
@@ -90,5 +97,5 @@ pub(crate) fn trc(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
         let time_s = trial.time_s(slot).unwrap_or(0.0);
         out.write_all(formats::trc::row(slot as u64 + 1, time_s, points).as_bytes())?;
     }
-    Ok(Notes::new())
+    Ok(())
 }

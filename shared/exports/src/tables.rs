@@ -64,13 +64,18 @@ pub(crate) fn wide(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
 pub(crate) fn long(trial: &Trial, out: &mut Sink<'_>) -> io::Result<Notes> {
     let mut table = csv::Writer::from_writer(out);
     table.write_record(LONG)?;
-    let names = trial.written_names();
+    let names: Vec<&str> = trial.names().collect();
     for slot in 0..trial.slots.len() {
         let [frame, time_s] = [trial.frame(slot).to_string(), cell(trial.time_s(slot))];
         let person = person(trial, slot);
         for (nth, name) in names.iter().enumerate() {
             let point = trial.point(slot, nth);
-            let mut row = vec![frame.clone(), time_s.clone(), person.clone(), name.clone()];
+            let mut row = vec![
+                frame.clone(),
+                time_s.clone(),
+                person.clone(),
+                (*name).to_owned(),
+            ];
             row.extend(place(point));
             row.extend((0..6).map(|i| cell(point.map(|point| point.covariance[i]))));
             row.push(cell(point.and_then(|point| point.reprojection_px)));

@@ -6,8 +6,6 @@ use nalgebra::{Matrix3, Point3, Rotation3, UnitVector3};
 use runfiles::{FrameLine, JointLine, PersonLine};
 use skeleton::JointSet;
 
-use crate::Naming;
-
 /// Maximum number of instants on the grid. It is more than a day at 50 Hz; a larger number is caused by a wrong frame number.
 const MAX_SLOTS: u64 = 5_000_000;
 /// Limit of coordinates, in metres. A larger coordinate counts as missing.
@@ -70,8 +68,6 @@ pub struct Trial {
     /// Ids of the person within the run, ascending. A person has several ids if no frame contains two people and the followed person had
     /// several ids one after the other.
     pub ids: Vec<u64>,
-    /// Naming of the points in the files.
-    pub naming: Naming,
     /// Set of joints.
     pub joints: &'static JointSet,
     /// Names of the points after the joints: extra keypoints of networks.
@@ -101,15 +97,9 @@ impl Trial {
         joints.chain(self.extras.iter().map(String::as_str))
     }
 
-    /// Returns the names of all points in text files.
-    pub fn written_names(&self) -> Vec<String> {
-        self.names().map(|name| self.naming.apply(name)).collect()
-    }
-
     /// Returns the names of all points with underscores for blanks, as formats of motion capture require.
     pub fn labels(&self) -> Vec<String> {
-        let names = self.written_names().into_iter();
-        names.map(|name| name.replace(' ', "_")).collect()
+        self.names().map(|name| name.replace(' ', "_")).collect()
     }
 
     /// Returns the lowest id of the person.
@@ -388,7 +378,6 @@ impl Gathering {
         let empty = Trial {
             name: name.to_owned(),
             ids: Vec::new(),
-            naming: Naming::default(),
             joints,
             extras: core::mem::take(&mut self.extras),
             views: core::mem::take(&mut self.views),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 
-use exports::{Gathering, Naming, Trial, TrialError, ViewCamera};
+use exports::{Gathering, Trial, TrialError, ViewCamera};
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use geometry::{Framing, OutSize, Rig};
 use messages::{Joint3d, SkeletonMessage, Skeletons, Status, topic};
@@ -41,8 +41,6 @@ impl Lines {
 pub struct Given {
     /// Name of the trial in the files.
     pub name: String,
-    /// Names of the points in the files.
-    pub naming: Naming,
     /// Choice of trajectories.
     pub lines: Lines,
     /// Frames of the footage per second, if the run has no frame rate.
@@ -118,7 +116,7 @@ impl Origin {
         });
         let up_in_world = given.up.or_else(|| setup.as_ref().ok()?.1.up_in_world());
         for trial in &mut trials {
-            (trial.naming, trial.up_in_world) = (given.naming, up_in_world);
+            trial.up_in_world = up_in_world;
         }
         let up_unknown = setup.as_ref().err().filter(|_| given.up.is_none()).cloned();
         Ok(Self {

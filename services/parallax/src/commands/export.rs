@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
-use launch::export::{Format, Given, Job, Lines, Naming, Origin, Trial, Written, as_json, export};
+use launch::export::{Format, Given, Job, Lines, Origin, Trial, Written, as_json, export};
 use nalgebra::{UnitVector3, Vector3};
 use terminal::{Globals, Terminal, output};
 
@@ -20,7 +20,8 @@ const BAR: &str = "{elapsed_precise} {bar:20} {pos}/{len} {prefix} {msg}";
 #[command(after_help = "\
 Formats, their use and content:
     c3d        motion capture        points, mm, z up; residual: standard deviation, mm, or -1 in a gap
-    trc        OpenSim               points, m, y up; NaN in a gap
+    trc        motion analysis       points, m, y up; NaN in a gap
+    opensim    OpenSim               a folder: points, markers for a full-body model, settings for scaling and inverse kinematics
     glb        viewers, Blender      skinned skeleton and animation, m, y up; in a gap, bones are missing
     bvh        animation             bones of fixed length (medians), cm, y up; in a gap, bones keep their last rotation
     csv        tables                a row for each frame, m, axes of the rig; standard deviations
@@ -47,7 +48,7 @@ damaged or still running; 130 stopped by Ctrl-C.
 
 Examples:
     parallax export out/my --to c3d,glb
-    parallax export out/my --to trc --names opensim
+    parallax export out/my --from smooth --to opensim
     parallax export out/my --to all --out results/walk --name walk
     parallax export run.mcap --to glb,mp4
     parallax export out/photos --to bvh --rate 25 --up 0,0,1")]
@@ -67,9 +68,6 @@ pub(crate) struct Arguments {
     /// Base name of the files.
     #[arg(long, default_value = "pose3d", value_parser = name)]
     name: String,
-    /// Names of the joints in the files: `own` as in the run (`right_ankle`), or `opensim` as in Pose2Sim's OpenSim models (`RAnkle`).
-    #[arg(long, value_enum, default_value_t = Names::Own)]
-    names: Names,
     /// Frames of the footage per second, if the run has no frame rate.
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
@@ -91,15 +89,6 @@ enum Trajectories {
     Raw,
     /// Smoothed: pose3d-smooth.jsonl.
     Smooth,
-}
-
-/// Names of the joints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Names {
-    /// `right_ankle`, `left_hip`, `head`.
-    Own,
-    /// `RAnkle`, `LHip`, `Head`; `Hip` for the pelvis.
-    Opensim,
 }
 
 /// A list of formats. Because of the alias, clap parses the list from a single argument.
@@ -158,10 +147,6 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         &arguments.source,
         &Given {
             name: arguments.name.clone(),
-            naming: match arguments.names {
-                Names::Own => Naming::Own,
-                Names::Opensim => Naming::OpenSim,
-            },
             lines: match arguments.from {
                 Trajectories::Raw => Lines::Raw,
                 Trajectories::Smooth => Lines::Smooth,
