@@ -323,12 +323,14 @@ impl Watch {
         }
     }
 
-    /// Returns true if the process waits for messages, but has received no message for so long that no more messages are expected.
+    /// Returns true if the process waits for messages, but has received no message for so long that no more messages are expected. A process
+    /// with incomplete frames is not idle: it processes them once it stops waiting for the missing views, which may take longer.
     pub(crate) fn is_idle(&self, policy: &Policy, now: Instant) -> bool {
         let since = |change: Change| now.saturating_duration_since(change.at);
         self.child().is_some()
             && since(self.iteration) < WAITING
             && since(self.received) > policy.idle_limit
+            && self.current.is_none_or(|health| health.n_waiting == 0)
     }
 
     /// Returns true if the heartbeats of the process report that it has finished.

@@ -402,6 +402,15 @@ fn a_process_that_missed_the_end_of_stream_does_not_block_the_end() {
 }
 
 #[test]
+fn a_process_that_waits_for_a_lost_view_is_not_taken_for_idle() {
+    let sink = ("sink", "wait-for-view 4000", Role::Essential);
+    let source = ("source", "leave", Role::Essential);
+    let run = Case::new(Delivery::Realtime, &[sink, source]).run(|_, _| {});
+    assert_eq!(run.got("sink"), [(0, 1)]);
+    assert_eq!(state_of(&run, "sink"), State::Finished);
+}
+
+#[test]
 fn a_run_without_any_view_left_fails() {
     let mut case = Case::new(
         Delivery::Realtime,

@@ -8,7 +8,7 @@ use crate::Refusal;
 /// The heartbeat, which every process sends a few times a second. A loop counter that does not
 /// change means that the process hangs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("Health.v5")]
+#[type_name("Health.v6")]
 #[repr(C)]
 pub struct Health {
     /// Run of the deployment.
@@ -43,6 +43,8 @@ pub struct Health {
     pub n_total: u64,
     /// Number of frames that the processor computed because the GPU was lost.
     pub n_without_gpu: u64,
+    /// Number of frames that wait for a message of another view.
+    pub n_waiting: u64,
     /// Number of rejected messages by cause, see [`Refusal::ALL`].
     pub refused: [u64; Refusal::N],
 }

@@ -73,7 +73,7 @@ const _: () = {
     assert!(size_of::<FusedView>() == 544);
     assert!(size_of::<SkeletonMessage>() == 11592 + MAX_KEYPOINTS * 88);
     assert!(size_of::<Skeletons>() == 64 + MAX_PEOPLE * size_of::<SkeletonMessage>());
-    assert!(size_of::<Health>() == 160);
+    assert!(size_of::<Health>() == 168);
     assert!(size_of::<MetricsRow>() == 56);
     assert!(size_of::<Metrics>() == 288 + MAX_ROWS * 56);
 };

@@ -48,6 +48,7 @@ struct Counts {
     n_sent: AtomicU64,
     n_total: AtomicU64,
     n_without_gpu: AtomicU64,
+    n_waiting: AtomicU64,
     last_frame: AtomicU64,
     finished: AtomicU32,
     refused: [AtomicU64; Refusal::N],
@@ -73,6 +74,7 @@ impl Health {
             n_sent: AtomicU64::new(0),
             n_total: AtomicU64::new(0),
             n_without_gpu: AtomicU64::new(0),
+            n_waiting: AtomicU64::new(0),
             last_frame: AtomicU64::new(0),
             finished: AtomicU32::new(0),
             refused: [const { AtomicU64::new(0) }; Refusal::N],
@@ -175,6 +177,11 @@ impl Health {
     /// Records the number of frames or results that are waiting in the process.
     pub fn queued(&self, n: usize) {
         self.counts.meter(|meter| meter.queued(n));
+    }
+
+    /// Records the number of frames that wait for a message of another view. A process with such frames is not idle.
+    pub fn waits(&self, n: usize) {
+        self.counts.n_waiting.store(n as u64, Ordering::Relaxed);
     }
 
     /// Records the number of people in a result.
@@ -297,6 +304,7 @@ impl Counts {
             cpu_millis: cpu_millis(),
             n_total: self.n_total.load(Ordering::Relaxed),
             n_without_gpu: self.n_without_gpu.load(Ordering::Relaxed),
+            n_waiting: self.n_waiting.load(Ordering::Relaxed),
             refused: self.refused.each_ref().map(|count| count.load(Ordering::Relaxed)),
         }
     }

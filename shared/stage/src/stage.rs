@@ -337,7 +337,9 @@ impl<'a, T: 'a> Stage<'a, T> {
         for held in &self.held {
             held.fill(context)?;
         }
-        Ok(inbox.poll(context)?)
+        inbox.poll(context)?;
+        self.service.health().waits(inbox.n_pending());
+        Ok(())
     }
 
     fn process(

@@ -39,6 +39,7 @@ fn serve() -> ExitCode {
         Some("receive") => receive(service, number(1), false),
         Some("die-at-end") => receive(service, 0, service.epoch() == 0),
         Some("hold") => hold(service),
+        Some("wait-for-view") => wait_for_view(service, number(1)),
         Some("die-in-loan") => die_in_loan(service),
         Some("think") => think(service, number(1)),
         Some("hang-once") => hang_once(service),
@@ -151,6 +152,21 @@ fn hold(service: &Service) -> Result<(), Failure> {
         waiter.wait(SOON)?;
     }
     print_line("holding")?;
+    idle(service)
+}
+
+/// Waits for a view that does not come, and then goes on without it.
+fn wait_for_view(service: &Service, millis: u64) -> Result<(), Failure> {
+    let waiter = service.bus().waiter();
+    let began = Instant::now();
+    service.health().waits(1);
+    while began.elapsed() < Duration::from_millis(millis) {
+        if waiter.wait(SOON)? == Woken::Stop {
+            return Ok(());
+        }
+    }
+    service.health().waits(0);
+    print_line("got 0 1")?;
     idle(service)
 }
 

@@ -180,9 +180,9 @@ structs! {
         id status n_joints n_keypoints n_views views_used n_pairs sides kept facing_margin sides_margin stature_m
         body_deviation joints views keypoints;
     Skeletons, "Skeletons.v1": stamp timing status views_present n_seen n_people people;
-    Health, "Health.v5":
+    Health, "Health.v6":
         session pid epoch n_loops at_nanos n_received n_sent n_dropped last_frame p50_micros p99_micros
-        peak_memory_bytes finished cpu_millis n_total n_without_gpu refused;
+        peak_memory_bytes finished cpu_millis n_total n_without_gpu n_waiting refused;
     CameraCounts, "CameraCounts.v3":
         n_connections n_made n_lost n_delivered n_used n_surplus n_overtaken n_refused rate_microhertz off_grid_nanos
         skew_nanos drift_ppb delay_nanos timed_by;
