@@ -262,11 +262,7 @@ fn a_window_beside_the_person_has_no_heat_in_any_map() {
         let sample = varied(&people[0], &people[1], (&shape, &vary), &mut rng).unwrap();
         let n_hot = sample.maps.iter().filter(|heat| **heat > 0.5).count();
         assert_eq!((n_hot == 0, sample.front == [0.0; 2]), (is_empty, is_empty));
-        assert_eq!(
-            sample.weights == [1.0; N_KEYPOINTS],
-            is_empty,
-            "all maps count"
-        );
+        assert_eq!(sample.weights, [1.0; N_KEYPOINTS]);
     }
 }
 
