@@ -239,6 +239,10 @@ fn the_files_for_opensim_name_the_same_markers_and_leave_other_files_in_the_fold
     let case = Case::new("export-opensim", &[2; 2], PLAIN);
     let ended = case.start(&["run", "deployment.toml"]).wait();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    assert!(
+        !case.path("out/pose3d.trc").exists(),
+        "nothing tells its rate"
+    );
     let told = ["--to", "opensim", "--rate", "20", "--up", "0,0,1"];
     let said = done(&case, "out", &told);
     let folder = case.path("out/export/pose3d-opensim");

@@ -1,7 +1,7 @@
 //! Tests of the export for OpenSim, with OpenSim itself.
 #![expect(
     clippy::print_stderr,
-    reason = "what is skipped, and what is measured, is told"
+    reason = "the test prints what it skips and what it measures"
 )]
 
 use std::path::Path;

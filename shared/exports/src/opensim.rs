@@ -1,8 +1,8 @@
 //! Files for `OpenSim`: the points over time, their positions on a model, and the settings for scaling and inverse kinematics.
 //!
 //! The bodies have the names of the full-body models of Rajagopal et al. (2016) and of their descendants, such as Pose2Sim's. Joints are
-//! placed at the joint centres of the model. Neck, head, nose, heels and toes are placed where the points of a synthetic person lie on the
-//! scaled model (`parallax-lab synth --rig ring:4 --subjects 503`).
+//! placed at the joint centres of the model. Neck, head, nose, heels and big toes are placed near the points of a run of a synthetic person
+//! on the scaled model (`parallax-lab synth --rig ring:4 --subjects 503`); small toes are placed by eye.
 
 use core::fmt::Write as _;
 use std::io;
