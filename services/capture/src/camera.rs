@@ -12,6 +12,7 @@ use stage::Stage;
 
 use crate::info::FeedInfo;
 use crate::job::Job;
+use crate::live::LiveCamera;
 use crate::supply::{Step, Supply};
 use deployment::capture::{Mode, Pace};
 
@@ -66,9 +67,15 @@ impl<'a> Camera<'a> {
 
     /// Opens a live camera, which sets its own pace.
     ///
-    /// * `size`: size of its pictures.
-    pub(crate) fn live(service: &'a Service, job: &'a Job, size: Size) -> Result<Self, Failure> {
-        Self::new(service, job, (size, 1), Pacer::as_fast_as_possible())
+    /// * `camera`, `size`: the camera and the size of its pictures, before they are shrunk.
+    pub(crate) fn live(
+        service: &'a Service,
+        job: &'a Job,
+        (camera, size): (&LiveCamera, Size),
+    ) -> Result<Self, Failure> {
+        let shrink = camera.shrink(size);
+        let pictures = (size.shrunk(shrink), shrink);
+        Self::new(service, job, pictures, Pacer::as_fast_as_possible())
     }
 
     /// Creates a camera.

@@ -50,7 +50,7 @@ struct Live<'a, 'b> {
 ///
 /// Fails with errors of the transport. If the camera cannot be opened, this is tried again and again.
 pub(crate) fn run(service: &Service, job: &Job, live: &LiveJob) -> Result<(), Failure> {
-    let mut camera = Camera::live(service, job, live.size)?;
+    let mut camera = Camera::live(service, job, (&live.camera, live.size))?;
     let step = job.source.step as f64;
     let grid = Grid::new(service.session() + live.lead_nanos, live.rate_hz / step);
     let noted = camera.wait_for_receivers();

@@ -134,10 +134,21 @@ impl RecordedFeed {
         let mut file = files::open(&recorded.file)?;
         let table = Table::read(&mut file, &recorded.camera, spec.frame_rate_hz)?;
         let n_frames = spec.n_delivered(table.n_frames())?;
-        let info = FeedInfo::plain(table.size, n_frames, table.rate_hz / spec.step as f64);
+        let plain = FeedInfo::plain(table.size, n_frames, table.rate_hz / spec.step as f64);
+        // The decoder of a stream shrinks pictures, during the recorded run as well.
+        let shrink = if table.pictures.iter().any(Picture::is_piece) {
+            table.size.divisor(spec.most_shrink)
+        } else {
+            1
+        };
+        let info = FeedInfo {
+            size: table.size.shrunk(shrink),
+            shrink,
+            ..plain
+        };
         Ok(Self {
+            rgb: vec![0; info.size.rgb_bytes()],
             info,
-            rgb: vec![0; table.size.rgb_bytes()],
             name: Recorded::address(&recorded.file, &recorded.camera),
             path: recorded.file.clone(),
             file,
@@ -224,7 +235,7 @@ impl RecordedFeed {
                 source,
             })?;
             self.stream = Some(Open {
-                decoder: RemadeStream::open(&self.name, pieces, self.table.size)?,
+                decoder: RemadeStream::open(&self.name, pieces, self.table.size, self.info.shrink)?,
                 connection: first.connection,
             });
         }

@@ -167,15 +167,16 @@ fn capture(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Fa
     let rig = inputs::rig_of(deployment)?;
     let framing = framing(resolved, &rig, view)?;
     let topology = resolved.topology();
+    let most_shrink = most_shrink(&framing);
     let job = capture::Job {
         view,
         source: SourceSpec {
-            most_shrink: most_shrink(&framing),
+            most_shrink,
             threads: cores::each(&topology, Stage::Capture).map(|cores| cores.max(1.0) as usize),
             ..crate::cameras::source(&deployment.cameras[view], &deployment.capture)
         },
         timeline: resolved.footage[view].timeline,
-        live: live::job(resolved, view),
+        live: live::job(resolved, view, most_shrink),
         lead_nanos: crate::cameras::lead_nanos(deployment),
         faults: deployment.cameras[view].fault.clone(),
         frozen_after: deployment.capture.frozen_after,

@@ -16,7 +16,10 @@ use crate::{FootageError, Size, StreamEnd};
 #[derive(Debug)]
 pub struct RemadeStream {
     name: String,
+    /// Size of the kept pictures.
     size: Size,
+    /// Size of the pictures that the decoder sends.
+    shown_size: Size,
     child: StreamEnd,
     stdout: ChildStdout,
     log: Log,
@@ -28,6 +31,7 @@ impl RemadeStream {
     /// * `name`: name of the stream in error messages.
     /// * `pieces`: the bytes of a head, followed by the bytes of its pictures in order ([`Piece`](crate::Piece)). A separate thread reads
     ///   them.
+    /// * `size`, `shrink`: size of the kept pictures, and the factor by which they are shrunk, which divides both sides.
     ///
     /// # Errors
     ///
@@ -36,14 +40,16 @@ impl RemadeStream {
         name: &str,
         pieces: impl Iterator<Item = Vec<u8>> + Send + 'static,
         size: Size,
+        shrink: usize,
     ) -> Result<Self, FootageError> {
+        let small = (shrink > 1).then(|| size.shrunk(shrink));
         let ffmpeg = PathBuf::from("ffmpeg");
         let not_started = |source| missing(&ffmpeg, name.as_ref(), source);
         let mut child = Command::new(&ffmpeg)
             .args([
                 "-nostdin", "-v", "error", "-copyts", "-f", "matroska", "-i", "pipe:0",
             ])
-            .args(outputs(&version_of(&ffmpeg)))
+            .args(outputs(&version_of(&ffmpeg), small))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -64,6 +70,7 @@ impl RemadeStream {
         Ok(Self {
             name: name.to_owned(),
             size,
+            shown_size: small.unwrap_or(size),
             child: StreamEnd(Arc::new(Mutex::new(child))),
             stdout,
             log: Log::follow(stderr).map_err(not_started)?,
@@ -78,13 +85,13 @@ impl RemadeStream {
     ///
     /// # Panics
     ///
-    /// Panics if the length of `rgb` does not match the size of a picture.
+    /// Panics if the length of `rgb` does not match the size of a picture after shrinking.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<Option<i64>, FootageError> {
         assert_eq!(
             rgb.len(),
-            self.size.rgb_bytes(),
+            self.shown_size.rgb_bytes(),
             "a picture is {} in RGB",
-            self.size
+            self.shown_size
         );
         let failed = |message: String| FootageError::Video {
             path: self.name.clone().into(),

@@ -20,6 +20,13 @@ impl Size {
         self.width * self.height * 3
     }
 
+    /// Returns the largest factor up to `most` that divides both sides; at least 1.
+    pub fn divisor(self, most: usize) -> usize {
+        let divides =
+            |by: &usize| self.width.is_multiple_of(*by) && self.height.is_multiple_of(*by);
+        (1..=most).rev().find(divides).unwrap_or(1)
+    }
+
     /// Returns the size of the image after shrinking it by a factor of at least 1.
     #[must_use]
     pub const fn shrunk(self, by: usize) -> Self {

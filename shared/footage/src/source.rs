@@ -9,6 +9,7 @@ mod live;
 pub(crate) mod log;
 mod numbers;
 pub(crate) mod password;
+mod planes;
 pub(crate) mod probe;
 pub(crate) mod program;
 mod sound;

@@ -19,7 +19,7 @@ use crate::source::LiveAddress;
 use crate::source::log::{Log, summary};
 use crate::source::password::without_password_of;
 use crate::source::probe::{fraction, is_5_1};
-use crate::source::program::missing;
+use crate::source::program::{missing, shrink_filter};
 use crate::{FootageError, Pieces, Size};
 
 /// Time without data, in seconds, after which a stream is assumed to have ended.
@@ -72,6 +72,8 @@ pub struct StreamSpec {
     pub keeps: bool,
     /// True if JPEG pictures over HTTP are sent without a boundary before the first one.
     pub is_bare: bool,
+    /// Maximum factor by which the decoder may shrink the pictures, as in [`SourceSpec::most_shrink`](crate::SourceSpec::most_shrink).
+    pub most_shrink: usize,
 }
 
 /// Properties of a stream, read from its first packets.
@@ -101,7 +103,10 @@ pub struct StreamFrame {
 pub struct LiveStream {
     address: String,
     shown: String,
+    /// Size of the camera's pictures.
     size: Size,
+    /// Size of the pictures that the decoder sends.
+    shown_size: Size,
     has_times: bool,
     child: StreamEnd,
     stdout: ChildStdout,
@@ -134,6 +139,7 @@ impl StreamSpec {
             ffprobe: "ffprobe".into(),
             keeps: false,
             is_bare: false,
+            most_shrink: 1,
         }
     }
 
@@ -199,6 +205,8 @@ impl StreamSpec {
 
     /// Starts the decoder. A frame of another size than `size` ends the stream.
     ///
+    /// * `size`: size of the camera's pictures, before they are shrunk.
+    ///
     /// # Errors
     ///
     /// Returns [`FootageError::FfmpegMissing`]. If the address does not answer, the error occurs only when the first frame is read.
@@ -212,6 +220,8 @@ impl StreamSpec {
             (None, None)
         };
         let version = version_of(&self.ffmpeg);
+        let shrink = size.divisor(self.most_shrink);
+        let small = (shrink > 1).then(|| size.shrunk(shrink));
         let times = if self.is_rtsp() && is_5_1(&version) {
             Some(inherited_pipe().map_err(not_started)?)
         } else {
@@ -223,7 +233,7 @@ impl StreamSpec {
             .args(self.input_options())
             .args(["-copyts", "-i"])
             .arg(&self.address)
-            .args(outputs(&version))
+            .args(outputs(&version, small))
             .args(to_keep.iter().flat_map(|_| AS_IT_CAME))
             .args(to_tell.iter().flat_map(|pipe| times_of_sender(pipe)))
             .stdin(to_keep.map_or_else(Stdio::null, Stdio::from))
@@ -245,6 +255,7 @@ impl StreamSpec {
             address: self.address.clone(),
             shown: self.shown(),
             size,
+            shown_size: small.unwrap_or(size),
             has_times: self.has_times(),
             child: StreamEnd(Arc::new(Mutex::new(child))),
             stdout,
@@ -314,7 +325,8 @@ impl StreamSpec {
 /// Returns the options that write the time and size of each frame to standard error, and then its pixels to standard output as for files.
 ///
 /// * `version`: version of `ffmpeg`.
-pub(crate) fn outputs(version: &str) -> Vec<String> {
+/// * `small`: size of the pixels, if they are shrunk.
+pub(crate) fn outputs(version: &str, small: Option<Size>) -> Vec<String> {
     let mode = if is_5_1(version) {
         "-fps_mode"
     } else {
@@ -323,11 +335,14 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
     let common = ["-map", "0:v:0", mode, "passthrough", "-autoscale", "0"];
     // With more threads, the step that copies the pixels holds a picture back until the next picture arrives.
     let alone = ["-threads", "1"];
-    let shrink = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
+    let top = format!("crop=iw:trunc(ih/{SHARE}):0:0:exact=1,format=gray");
+    let shrink = small.map(shrink_filter);
+    let shrink: Vec<&str> =
+        shrink.as_deref().into_iter().flat_map(|filter| ["-vf", filter]).collect();
     let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
     let times = [
         "-vf",
-        &shrink,
+        &top,
         "-enc_time_base",
         "1:1000000",
         "-flush_packets",
@@ -340,6 +355,7 @@ pub(crate) fn outputs(version: &str) -> Vec<String> {
         &["-f", "framecrc", "pipe:2"],
         &common,
         &alone,
+        &shrink,
         &pixels,
     ];
     all.concat().into_iter().map(str::to_owned).collect()
@@ -370,13 +386,13 @@ impl LiveStream {
     ///
     /// # Panics
     ///
-    /// Panics if the length of `rgb` does not match the size with which the stream was opened.
+    /// Panics if the length of `rgb` does not match the size with which the stream was opened, after shrinking.
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<StreamFrame, FootageError> {
         assert_eq!(
             rgb.len(),
-            self.size.rgb_bytes(),
+            self.shown_size.rgb_bytes(),
             "a frame is {} in RGB",
-            self.size
+            self.shown_size
         );
         if let Err(error) = self.stdout.read_exact(rgb) {
             self.child.end();

@@ -16,6 +16,9 @@ const SIZE: Size = Size {
     height: 48,
 };
 
+/// Factors by which the decoders shrink the pictures.
+const SHRINKS: [usize; 2] = [1, 4];
+
 /// Returns a stream of 80 pictures, every fifth of which can be decoded independently. A decoder reads most of the stream to identify it.
 fn stream() -> Vec<u8> {
     let made = Command::new("ffmpeg")
@@ -44,7 +47,7 @@ fn stream() -> Vec<u8> {
 }
 
 /// Returns the pictures of a live stream with their times, and its pieces.
-fn live() -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
+fn live(shrink: usize) -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp://{}", listener.local_addr().unwrap());
     let server = std::thread::Builder::new().spawn(move || {
@@ -54,11 +57,12 @@ fn live() -> (Vec<(i64, Vec<u8>)>, Vec<Piece>) {
     });
     let spec = StreamSpec {
         keeps: true,
+        most_shrink: shrink,
         ..StreamSpec::new(address)
     };
     let mut live = spec.open(SIZE).unwrap();
     let mut pictures = Vec::new();
-    let mut rgb = vec![0; SIZE.rgb_bytes()];
+    let mut rgb = vec![0; SIZE.shrunk(shrink).rgb_bytes()];
     while let Ok(frame) = live.next_into(&mut rgb) {
         pictures.push((frame.label_nanos, rgb.clone()));
     }
@@ -82,29 +86,31 @@ fn a_recorded_stream_decodes_to_the_same_pictures() {
     if !clip::has_ffmpeg() {
         return;
     }
-    let (pictures, pieces) = live();
-    assert!(pictures.len() >= 3, "{}", pictures.len());
-    let n_heads = pieces.iter().filter(|piece| piece.kind == PieceKind::Head).count();
-    assert!(
-        n_heads >= 1,
-        "before every picture that needs no other: {n_heads}"
-    );
-    let is_first_head = |nth: usize, it: &Piece| nth == 0 || it.kind != PieceKind::Head;
-    let bytes: Vec<Vec<u8>> = pieces
-        .iter()
-        .enumerate()
-        .filter(|(nth, it)| is_first_head(*nth, it))
-        .map(|piece| piece.1.bytes.clone())
-        .collect();
-    let mut again = RemadeStream::open("kept", bytes.into_iter(), SIZE).unwrap();
-    let mut rgb = vec![0; SIZE.rgb_bytes()];
-    let mut n_same = 0;
-    while let Some(label) = again.next_into(&mut rgb).unwrap() {
-        let is_it = |frame: &&(i64, Vec<u8>)| frame.0.abs_diff(label) <= 1_000_000;
-        if let Some((_, expected)) = pictures.iter().find(is_it) {
-            assert!(rgb == *expected, "the picture at {label}");
-            n_same += 1;
+    for shrink in SHRINKS {
+        let (pictures, pieces) = live(shrink);
+        assert!(pictures.len() >= 3, "{}", pictures.len());
+        let n_heads = pieces.iter().filter(|piece| piece.kind == PieceKind::Head).count();
+        assert!(
+            n_heads >= 1,
+            "before every picture that needs no other: {n_heads}"
+        );
+        let is_first_head = |nth: usize, it: &Piece| nth == 0 || it.kind != PieceKind::Head;
+        let bytes: Vec<Vec<u8>> = pieces
+            .iter()
+            .enumerate()
+            .filter(|(nth, it)| is_first_head(*nth, it))
+            .map(|piece| piece.1.bytes.clone())
+            .collect();
+        let mut again = RemadeStream::open("kept", bytes.into_iter(), SIZE, shrink).unwrap();
+        let mut rgb = vec![0; SIZE.shrunk(shrink).rgb_bytes()];
+        let mut n_same = 0;
+        while let Some(label) = again.next_into(&mut rgb).unwrap() {
+            let is_it = |frame: &&(i64, Vec<u8>)| frame.0.abs_diff(label) <= 1_000_000;
+            if let Some((_, expected)) = pictures.iter().find(is_it) {
+                assert!(rgb == *expected, "the picture at {label}");
+                n_same += 1;
+            }
         }
+        assert!(n_same >= 3, "{n_same} of {}", pictures.len());
     }
-    assert!(n_same >= 3, "{n_same} of {}", pictures.len());
 }

@@ -159,6 +159,50 @@ fn videos_are_shrunk_by_a_divisor_of_their_size_to_means_of_pixels() {
 }
 
 #[test]
+fn shrunk_pictures_sent_as_planes_have_the_colours_of_the_decoder() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for space in ["smpte170m", "bt709"] {
+        let path = folder.path().join(format!("{space}.nut"));
+        let made = Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i"])
+            .args(["testsrc=size=96x64:duration=0.1", "-c:v", "ffv1"])
+            .args(["-vf", &format!("scale=out_color_matrix={space}")])
+            .args([
+                "-pix_fmt",
+                "yuv420p",
+                "-colorspace",
+                space,
+                "-color_range",
+                "tv",
+            ])
+            .arg(&path)
+            .status();
+        assert!(made.unwrap().success());
+        let decoded = Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-i"])
+            .arg(&path)
+            .args(["-vf", "scale=48:32:flags=area+accurate_rnd+full_chroma_int"])
+            .args(["-pix_fmt", "rgb24", "-f", "rawvideo", "-"])
+            .output()
+            .unwrap();
+        let (info, small) = frames(&SourceSpec {
+            most_shrink: 2,
+            ..spec(&path)
+        });
+        assert_eq!((info.size, info.shrink), (Size::new(48, 32), 2));
+        let own: Vec<u8> = small.into_iter().flat_map(|(_, rgb)| rgb).collect();
+        assert_eq!(own.len(), decoded.stdout.len());
+        let differences = own.iter().zip(&decoded.stdout).map(|(a, b)| a.abs_diff(*b));
+        let all: Vec<u8> = differences.collect();
+        let mean = all.iter().map(|by| f64::from(*by)).sum::<f64>() / all.len() as f64;
+        assert!(mean < 1.0, "{space}: {mean} of 255 on average");
+    }
+}
+
+#[test]
 fn frames_excluded_by_an_edit_list_are_skipped() {
     if !has_ffmpeg() {
         return;

@@ -24,6 +24,8 @@ pub struct LiveCamera {
     pub transport: Option<Transport>,
     /// True to use the times that an RTSP camera states for its pictures, as long as they are plausible.
     pub has_own_clock: bool,
+    /// Maximum factor by which the decoder of a stream may shrink the pictures ([`footage::SourceSpec::most_shrink`]).
+    pub most_shrink: usize,
 }
 
 /// Error if a live camera cannot be used.
@@ -107,6 +109,7 @@ impl LiveCamera {
             controls: BTreeMap::new(),
             transport: None,
             has_own_clock: true,
+            most_shrink: 1,
         }
     }
 
@@ -180,7 +183,16 @@ impl LiveCamera {
     pub(super) fn stream(&self, address: &str) -> StreamSpec {
         StreamSpec {
             transport: self.transport,
+            most_shrink: self.most_shrink,
             ..StreamSpec::new(address)
+        }
+    }
+
+    /// Returns the factor by which pictures of a size are shrunk before they are delivered.
+    pub(crate) fn shrink(&self, size: Size) -> usize {
+        match &self.address {
+            LiveAddress::Device(_) => 1,
+            LiveAddress::Stream(_) => size.divisor(self.most_shrink),
         }
     }
 }

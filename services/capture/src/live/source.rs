@@ -94,7 +94,7 @@ pub(crate) struct Source {
 impl Source {
     /// Starts the thread.
     ///
-    /// * `size`: size of the pictures. Another size counts as a failure of the camera.
+    /// * `size`: size of the pictures, before they are shrunk. Another size counts as a failure of the camera.
     /// * `originals`: queue for original pictures, if they are to be kept.
     pub(crate) fn start(
         camera: &LiveCamera,
@@ -260,7 +260,8 @@ impl Keeper {
     fn room(&self) -> Vec<u8> {
         let spare = self.shared.state().spare.pop();
         let mut rgb = spare.unwrap_or_default();
-        rgb.resize(self.size.rgb_bytes(), 0);
+        let delivered = self.size.shrunk(self.camera.shrink(self.size));
+        rgb.resize(delivered.rgb_bytes(), 0);
         rgb
     }
 

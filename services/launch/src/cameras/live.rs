@@ -34,6 +34,7 @@ pub fn live_camera(camera: &Camera) -> Option<LiveCamera> {
             Transport::Udp => footage::Transport::Udp,
         }),
         has_own_clock: camera.clock != Some(CameraClock::Arrival),
+        most_shrink: 1,
     })
 }
 

@@ -6,7 +6,13 @@ use scene::{Address, skew_ms_of};
 use crate::resolved::Resolved;
 
 /// Returns the settings of a view's live camera, if the view has one.
-pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> {
+///
+/// * `most_shrink`: maximum factor by which a decoder may shrink the pictures.
+pub(super) fn job(
+    resolved: &Resolved,
+    view: usize,
+    most_shrink: usize,
+) -> Option<capture::LiveJob> {
     let entry = &resolved.deployment.cameras[view];
     let mut camera = crate::cameras::live_camera(entry)?;
     let footage = &resolved.footage[view];
@@ -16,7 +22,10 @@ pub(super) fn job(resolved: &Resolved, view: usize) -> Option<capture::LiveJob> 
         camera.rate_hz = footage.frame_rate_hz.map(|frame_rate_hz| frame_rate_hz * step);
     }
     Some(capture::LiveJob {
-        camera,
+        camera: capture::LiveCamera {
+            most_shrink,
+            ..camera
+        },
         size: Size::new(footage.size[0] as usize, footage.size[1] as usize),
         rate_hz: resolved.instants_hz(),
         is_kept: resolved

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::answers::run_ffprobe;
+use super::planes::Standard;
 use crate::{FootageError, Size, SourceSpec, Turn};
 
 /// Properties of a video that are known before it is decoded.
@@ -34,10 +35,13 @@ pub(super) struct Probe {
     pub(super) is_interlaced: bool,
     /// True if the `ffmpeg` option that keeps every frame is called `-fps_mode` (since version 5.1), false if it is called `-vsync`.
     pub(super) has_fps_mode: bool,
+    /// Standard of the colours, if shrunk pictures can be sent as planes.
+    pub(super) standard: Option<Standard>,
 }
 
 const ENTRIES: &str = "program_version=version:\
-    stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order:\
+    stream=index,codec_name,width,height,nb_frames,avg_frame_rate,r_frame_rate,duration,start_time,has_b_frames,field_order,\
+    pix_fmt,color_space,color_range:\
     stream_disposition=attached_pic,timed_thumbnails,still_image:stream_side_data:format=format_name,duration,start_time";
 /// An unusual frame rate. It is passed to ffprobe to see whether ffprobe only repeats it, for a stream without a container.
 const ODD_RATE: &str = "225/32";
@@ -86,6 +90,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         origin_s: origin(stream, &output["format"], codec),
         is_inter: !INTRA.contains(&codec),
         is_interlaced: ["tt", "bb", "tb", "bt"].iter().any(|name| stream["field_order"] == *name),
+        standard: Standard::of_stream(stream),
         has_fps_mode: is_5_1(output["program_version"]["version"].as_str().unwrap_or("")),
     };
     let is_regular = probe.n_frames > 0 && clock_hz == fraction(&stream["r_frame_rate"]);

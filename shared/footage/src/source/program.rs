@@ -3,7 +3,12 @@
 use std::io;
 use std::path::Path;
 
-use crate::FootageError;
+use crate::{FootageError, Size};
+
+/// Returns the filter that shrinks pictures to a size. Each pixel is the mean of the pixels that it covers.
+pub(crate) fn shrink_filter(Size { width, height }: Size) -> String {
+    format!("scale={width}:{height}:flags=area+accurate_rnd+full_chroma_int")
+}
 
 /// Returns the options that ffmpeg needs to read a file. A sequence of JPEG pictures is a video, regardless of the file's name.
 pub(crate) fn input_options(path: &Path) -> &'static [&'static str] {

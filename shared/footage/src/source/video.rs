@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use super::log::{Complaints, Log};
+use super::planes::Standard;
 use super::probe::{Probe, key_frames, probe};
-use super::program::{input_name, input_options, missing};
+use super::program::{input_name, input_options, missing, shrink_filter};
 use crate::{FootageError, Size, SourceSpec};
 
 /// A running decoder. Dropping this value kills the decoder. If this process dies without dropping it,
@@ -39,6 +40,8 @@ pub(super) struct Video {
     child: Child,
     stdout: ChildStdout,
     log: Log,
+    /// Memory for a picture that the decoder sends as planes.
+    planes: Vec<u8>,
 }
 
 impl Video {
@@ -81,6 +84,7 @@ impl Video {
             child,
             stdout,
             log: Log::follow(stderr).map_err(not_started)?,
+            planes: Vec::new(),
         })
     }
 
@@ -146,6 +150,19 @@ impl Video {
 
     /// Reads the pixels of the next frame of the decoder. Returns true if there was a frame.
     fn fill(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
+        let Some(standard) = planes(&self.probe, &self.spec) else {
+            return self.fill_with_bytes(rgb);
+        };
+        let mut planes = core::mem::take(&mut self.planes);
+        planes.resize(rgb.len(), 0);
+        let is_there = self.fill_with_bytes(&mut planes);
+        standard.to_rgb(&planes, rgb);
+        self.planes = planes;
+        is_there
+    }
+
+    /// Reads the bytes of the next frame of the decoder. Returns true if there was a frame.
+    fn fill_with_bytes(&mut self, rgb: &mut [u8]) -> Result<bool, FootageError> {
         let mut filled = 0;
         while filled < rgb.len() {
             match self.stdout.read(&mut rgb[filled..]) {
@@ -249,17 +266,14 @@ fn turned_size(probe: &Probe, spec: &SourceSpec) -> Size {
 
 /// Returns the factor by which the pictures are shrunk.
 fn shrink(probe: &Probe, spec: &SourceSpec) -> usize {
-    let Size { width, height } = probe.stored;
-    let divides = |by: &usize| width.is_multiple_of(*by) && height.is_multiple_of(*by);
-    (1..=spec.most_shrink).rev().find(divides).unwrap_or(1)
+    probe.stored.divisor(spec.most_shrink)
 }
 
-/// Returns the filter that shrinks the pictures, if they are shrunk.
-fn shrinking(probe: &Probe, spec: &SourceSpec) -> Option<String> {
-    let by = shrink(probe, spec);
-    let Size { width, height } = probe.stored.shrunk(by);
-    let filter = format!("scale={width}:{height}:flags=area+accurate_rnd+full_chroma_int");
-    (by > 1).then_some(filter)
+/// Returns the standard of pictures that the decoder sends as planes. It does this for pictures that are shrunk but not rotated.
+fn planes(probe: &Probe, spec: &SourceSpec) -> Option<Standard> {
+    let is_shrunk = shrink(probe, spec) > 1;
+    let is_level = spec.rotation.turn(probe.tag).filters().is_none();
+    probe.standard.filter(|_| is_shrunk && is_level)
 }
 
 /// Returns true if the decoder can report the times of frames.
@@ -302,9 +316,12 @@ fn outputs(probe: &Probe, spec: &SourceSpec) -> Vec<String> {
         let small = "crop=2:2:0:0:exact=1".to_owned();
         arguments.extend(output(probe, &all, [small], &times));
     }
-    let pixels = ["-f", "rawvideo", "-pix_fmt", "rgb24", "pipe:1"];
+    let format = planes(probe, spec).map_or("rgb24", |_| "yuv444p");
+    let pixels = ["-f", "rawvideo", "-pix_fmt", format, "pipe:1"];
     let turn = spec.rotation.turn(probe.tag).filters();
-    let filters = shrinking(probe, spec).into_iter().chain(turn);
+    let by = shrink(probe, spec);
+    let small = (by > 1).then(|| shrink_filter(probe.stored.shrunk(by)));
+    let filters = small.into_iter().chain(turn);
     arguments.extend(output(probe, spec, filters, &pixels));
     arguments
 }
@@ -380,6 +397,7 @@ mod tests {
             is_inter: false,
             is_interlaced: false,
             has_fps_mode: true,
+            standard: None,
         }
     }
 
@@ -423,7 +441,7 @@ mod tests {
     #[test]
     fn stream_options_write_the_times_before_the_pixels() {
         assert!(comes_before(
-            &crate::stream::outputs("5.1"),
+            &crate::stream::outputs("5.1", None),
             "framecrc",
             "rawvideo"
         ));
