@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::rc::Rc;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
-use footage::{Affine, Fill, Pacer, Size, Warp};
+use footage::{Fill, Pacer, Size, Warp, shrunk_map};
 use messages::{CameraCounts, Cause, FrameHeader, Stamp, Status, Timing, topic};
 use runtime::metrics::Passage;
 use runtime::{Place, Service, SlicePublisher, Woken};
@@ -23,12 +23,6 @@ pub(crate) struct Shot {
     pub(crate) asked_at: u64,
     /// Time from the nominal time of the frame until the picture was taken.
     pub(crate) skew: i64,
-}
-
-/// Converts a mapping from the output to full-size pictures into a mapping to shrunk pictures.
-fn shrunk(source_from_output: Affine, by: usize) -> Affine {
-    let by = by as f64;
-    source_from_output.map(|[x, y, shift]| [x / by, y / by, (shift + 0.5) / by - 0.5])
 }
 
 /// One camera, with the topic of its frames.
@@ -97,7 +91,7 @@ impl<'a> Camera<'a> {
         } else {
             Fill::Black
         };
-        let map = shrunk(job.framing.source_from_output(), shrink);
+        let map = shrunk_map(&job.framing.source_from_output(), shrink as f64);
         let output = Size::new(width, height);
         let warp = Warp::new(size, output, &map, fill).or_fail(ExitKind::Input)?;
         Ok(Self {

@@ -45,4 +45,4 @@ pub use source::{
 pub use spec::{PictureNumbers, SourceSpec};
 pub use stream::{LiveStream, StreamEnd, StreamFrame, StreamSpec, Transport};
 pub use turn::{Rotation, Turn};
-pub use warp::{Affine, Fill, Warp, WarpError, resize_map};
+pub use warp::{Affine, Fill, Warp, WarpError, resize_map, shrunk_map};

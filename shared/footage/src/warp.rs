@@ -5,13 +5,13 @@
 )]
 
 mod area;
+mod bilinear;
 mod near;
-mod sampled;
 
 use area::Area;
+use bilinear::Bilinear;
 use kernels::{Body, Isa, dispatch};
 use near::Near;
-use sampled::Sampled;
 
 use crate::Size;
 
@@ -24,8 +24,8 @@ const MAX_SCALE: f64 = 64.0;
 /// Maximum translation, in pixels: larger than any image, and exact in fixed point.
 const MAX_SHIFT: f64 = 1e6;
 
-/// Maximum distance between neighbouring output pixels with a single sample, in source pixels. The two focal lengths of a lens differ by
-/// less than the excess, so that a picture that is only rotated takes one sample per pixel.
+/// Maximum distance between neighbouring output pixels at which a picture is not shrunk before it is rotated, in source pixels. The two
+/// focal lengths of a lens differ by less than the excess, so that a picture that is only rotated is not shrunk.
 const SINGLE: f64 = 1.05;
 
 /// The value of pixels outside of the source.
@@ -71,10 +71,8 @@ pub enum WarpError {
 /// * With the identity, the pixel is copied.
 /// * With a map that keeps rows and columns and does not enlarge (shrink, crop, mirror), the value is the area mean of the rectangle that
 ///   the output pixel covers. It is exact up to rounding to a grey level (half up).
-/// * With any other map, the value is the mean of `n × m` bilinear samples. They are spread evenly over the output pixel and are at most
-///   one source pixel apart, or 1.05 if there is only one. For a rotated image, the result is the same as rotating it at full size
-///   (bilinear) and then averaging areas. Positions are rounded to 1/32 source pixel. From 4 source pixels per output pixel on, the
-///   rounding is coarser, but never coarser than 1/64 output pixel.
+/// * With any other map, the value is one bilinear sample. If the map shrinks more than 1.05 times, the image is first shrunk to the scale
+///   of the output, by area means. Positions are rounded to 1/32 pixel of that image.
 ///
 /// The result is bit-identical on every machine, because it only sums integers, or `f32` values in a fixed order.
 #[derive(Debug, Clone)]
@@ -89,7 +87,41 @@ enum Plan {
     Copy,
     Area(Area),
     Near(Near),
-    Sampled(Sampled),
+    Shrunk(Shrunk),
+}
+
+/// A picture that is shrunk before it is rotated.
+#[derive(Debug, Clone)]
+struct Shrunk {
+    area: Area,
+    /// The shrunk picture.
+    rgb: Vec<u8>,
+    near: Near,
+}
+
+impl Shrunk {
+    /// * `by`: number of source pixels per output pixel.
+    fn new([source, output]: [Size; 2], map: &Affine, by: f64, fill: Fill) -> Self {
+        let side = |side: usize| ((side as f64 / by - 1e-9).ceil() as usize).max(1);
+        let small = Size::new(side(source.width), side(source.height));
+        let axis = [by, (by - 1.0) / 2.0];
+        Self {
+            area: Area::new(source, small, [axis, axis], Fill::Replicate),
+            rgb: vec![0; small.rgb_bytes()],
+            near: Near(Bilinear::new([small, output], &shrunk_map(map, by), fill)),
+        }
+    }
+
+    #[inline(always)]
+    fn apply(&mut self, source: &[u8], out: &mut [u8]) {
+        self.area.apply(source, &mut self.rgb);
+        self.near.apply(&self.rgb, out);
+    }
+}
+
+/// Converts a map from the output to full-size pictures into a map to pictures that are shrunk by a factor.
+pub fn shrunk_map(source_from_output: &Affine, by: f64) -> Affine {
+    source_from_output.map(|[x, y, shift]| [x / by, y / by, (shift + 0.5) / by - 0.5])
 }
 
 impl Warp {
@@ -124,10 +156,13 @@ impl Warp {
         } else if keeps_rows && a.abs() >= 1.0 && d.abs() >= 1.0 {
             Plan::Area(Area::new(source, output, [[a, tx], [d, ty]], fill))
         } else {
-            let n_samples = scales.map(n_samples);
+            let by = scales[0].max(scales[1]);
             let sizes = [source, output];
-            let sampled = Sampled::new(sizes, source_from_output, n_samples, fill);
-            Near::new(&sampled).map_or(Plan::Sampled(sampled), Plan::Near)
+            if by > SINGLE {
+                Plan::Shrunk(Shrunk::new(sizes, source_from_output, by, fill))
+            } else {
+                Plan::Near(Near(Bilinear::new(sizes, source_from_output, fill)))
+            }
         };
         Ok(Self {
             source,
@@ -188,7 +223,7 @@ impl Body for Run<'_> {
             Plan::Copy => self.out.copy_from_slice(self.source),
             Plan::Area(area) => area.apply(self.source, self.out),
             Plan::Near(near) => near.apply(self.source, self.out),
-            Plan::Sampled(sampled) => sampled.apply(self.source, self.out),
+            Plan::Shrunk(shrunk) => shrunk.apply(self.source, self.out),
         }
     }
 }
@@ -200,16 +235,6 @@ pub fn resize_map(source: Size, output: Size) -> Affine {
     let sx = source.width as f64 / output.width as f64;
     let sy = source.height as f64 / output.height as f64;
     [[sx, 0.0, (sx - 1.0) / 2.0], [0.0, sy, (sy - 1.0) / 2.0]]
-}
-
-/// Returns the number of samples of an output pixel along rows or columns.
-///
-/// * `scale`: number of source pixels per output pixel.
-fn n_samples(scale: f64) -> usize {
-    if scale <= SINGLE {
-        return 1;
-    }
-    (scale - 1e-9).ceil() as usize
 }
 
 /// Returns the number of source pixels per output pixel along the output's rows and columns.
@@ -250,7 +275,7 @@ mod tests {
 
     /// A lens whose focal lengths differ by some thousandths is scaled by as much when its picture is rotated.
     #[test]
-    fn a_rotated_picture_of_two_focal_lengths_takes_one_sample_per_pixel() {
+    fn a_rotated_picture_of_two_focal_lengths_is_not_shrunk() {
         let (sin, cos) = f64::sin_cos(0.03);
         for scale in [0.997, 1.0, 1.003] {
             let map = [[scale * cos, -sin, 1.0], [scale * sin, cos, -1.0]];
@@ -295,11 +320,11 @@ mod tests {
             let map = [[scale * cos, -scale * sin, tx], [scale * sin, scale * cos, ty]];
             let fill = if replicate { Fill::Replicate } else { Fill::Black };
             let output = Size::new(size.0, size.1);
-            let mut sampled = Sampled::new([SOURCE, output], &map, [1, 1], fill);
-            let near = Near::new(&sampled).unwrap();
-            let [mut expected, mut actual] = [vec![99; output.rgb_bytes()], vec![77; output.rgb_bytes()]];
-            sampled.apply(&noise(), &mut expected);
-            near.apply(&noise(), &mut actual);
+            let bilinear = Bilinear::new([SOURCE, output], &map, fill);
+            let each = (0..size.1).flat_map(|y| (0..size.0).map(move |x| [x, y]));
+            let expected: Vec<u8> = each.flat_map(|at| bilinear.pixel(&noise(), at)).collect();
+            let mut actual = vec![77; output.rgb_bytes()];
+            Near(bilinear).apply(&noise(), &mut actual);
             prop_assert_eq!(actual, expected);
         }
     }

@@ -1,30 +1,22 @@
-//! Computes bilinear samples in few steps, for maps that rotate a picture without shrinking it.
+//! Computes bilinear samples in few steps.
 //!
-//! [`Sampled`] is the readable reference, which gives bit-identical results but takes four times as long. It also computes the pixels at
-//! the border.
+//! [`Bilinear`] is the readable reference, which gives bit-identical results. It also computes the pixels at the border.
 
 use std::ops::Range;
 
-use super::sampled::{POSITION_BITS, Sampled, Start};
+use super::bilinear::{Bilinear, PART_BITS, PARTS, POSITION_BITS, SUM_BITS, Start};
 
 /// Number of bytes that are copied for a pixel: its three channels, and one of the next pixel.
 const LANES: usize = 4;
 /// Number of positions that are processed together.
 const TILE: usize = 64;
-/// Number of fractional bits of a position, in source pixels.
-const PART_BITS: u32 = 5;
-const PARTS: u16 = 1 << PART_BITS;
-/// Number of bits of the sum of all weights.
-const SUM_BITS: u32 = 2 * PART_BITS;
 
 /// A lane for each channel of every position of a tile.
 type Lanes = [[u8; LANES]; TILE];
 
 /// Computes the mean of the four source pixels around every position, weighted by their nearness.
 #[derive(Debug, Clone)]
-pub(super) struct Near {
-    sampled: Sampled,
-}
+pub(super) struct Near(pub(super) Bilinear);
 
 /// Data of several positions of a row.
 struct Tile {
@@ -36,13 +28,6 @@ struct Tile {
 }
 
 impl Near {
-    /// Converts the samples of a map; returns `None` if a position uses more than four pixels, or has other fractional bits.
-    pub(super) fn new(sampled: &Sampled) -> Option<Self> {
-        sampled.is_bilinear(PART_BITS).then(|| Self {
-            sampled: sampled.clone(),
-        })
-    }
-
     #[inline(always)]
     pub(super) fn apply(&self, source: &[u8], out: &mut [u8]) {
         let mut tile = Tile {
@@ -50,16 +35,16 @@ impl Near {
             parts: [[[0; LANES]; TILE]; 2],
             mean: [[0; LANES]; TILE],
         };
-        let width = self.sampled.width();
+        let width = self.0.width();
         let pixels = out.as_chunks_mut::<3>().0;
         for (y, row) in pixels.chunks_exact_mut(width).enumerate() {
             let within = self.within(y);
             for x in (0..within.start).chain(within.end..width) {
-                row[x] = self.sampled.pixel_across(source, [x as i64, y as i64]);
+                row[x] = self.0.pixel(source, [x, y]);
             }
             let start = within.start;
             for (nth, pixels) in row[within].chunks_mut(TILE).enumerate() {
-                let start = self.sampled.start([start + nth * TILE, y]);
+                let start = self.0.start([start + nth * TILE, y]);
                 tile.copy(source, start, pixels.len());
                 tile.add_up();
                 for (pixel, mean) in pixels.iter_mut().zip(&tile.mean) {
@@ -72,8 +57,8 @@ impl Near {
     /// Returns the part of an output row whose positions have all four pixels. It is one range, because a row is straight in the source.
     #[inline(always)]
     fn within(&self, y: usize) -> Range<usize> {
-        let width = self.sampled.width();
-        let has_all = |x: &usize| self.sampled.has_all([*x as i64, y as i64]);
+        let width = self.0.width();
+        let has_all = |x: &usize| self.0.has_all([*x, y]);
         let first = (0..width).find(has_all).unwrap_or(width);
         let end = (first..width).rfind(has_all).map_or(first, |last| last + 1);
         first..end
