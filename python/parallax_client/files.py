@@ -206,7 +206,7 @@ def read_folder(folder):
 def read_recording(file, about="skeletons"):
     """Yields the messages of one kind in a recording (MCAP), as pairs of topic and message. Needs the package `mcap`.
 
-    about: "skeletons", "people", "view-pose", "pair-pose", "view-quality" or "health".
+    about: "skeletons", "people", "sightings", "pair-pose", "view-quality" or "health".
     """
     try:
         from mcap.reader import make_reader

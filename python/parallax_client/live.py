@@ -375,7 +375,7 @@ class _Run:
         names = [it["name"] for it in guest.running["views"]] if cameras is None else list(cameras)
         views = {name: _number(guest, name) for name in names} if poses or pictures else {}
         self._skeletons = guest.port("skeletons") if skeletons else None
-        self._poses = {name: guest.port("view-pose", view) for name, view in views.items()} if poses else {}
+        self._poses = {name: guest.port("sightings", view) for name, view in views.items()} if poses else {}
         self._pictures = {name: guest.port("frame", view) for name, view in views.items()} if pictures else {}
         self._pending, self._next = {}, 0
 

@@ -192,14 +192,14 @@ fn lanes(
                 add(Port::Frame(port), None);
             }
             deployment::hosts::Carry::Poses => {
-                let name = topic::view_pose(view);
-                let port = Receiver::open(bus, Kind::ViewPose, &name, waiter, false)?;
+                let name = topic::sightings(view);
+                let port = Receiver::open(bus, Kind::Sightings, &name, waiter, false)?;
                 let evidence = job.maps.get(view).map(|_| {
                     let port = bus.slice_subscriber(&topic::evidence(view), waiter)?;
                     Ok::<_, Failure>(Evidence { port, newest: None })
                 });
                 add(
-                    Port::Message(Content::ViewPose, port),
+                    Port::Message(Content::Sightings, port),
                     evidence.transpose()?,
                 );
                 if job.has_quality {
@@ -357,7 +357,7 @@ impl Sending<'_> {
             }
             Item::Frame { header, .. } => (&[][..], [0; 2], header.n_dropped, 0),
             Item::Message {
-                content: Content::ViewPose,
+                content: Content::Sightings,
                 data,
                 maps,
                 ..

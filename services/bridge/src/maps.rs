@@ -155,7 +155,7 @@ pub(crate) fn split(body: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     let (length, rest) = body.split_first_chunk()?;
     let (poses, maps) = rest.split_at_checked(u32::from_le_bytes(*length) as usize)?;
     let mut whole = Vec::new();
-    recording::encode(Kind::ViewPose, &[], &[], &mut whole);
+    recording::encode(Kind::Sightings, &[], &[], &mut whole);
     if poses.len() > whole.len() {
         return None;
     }
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn poses_and_maps_survive_joining_and_splitting() {
         let mut poses = Vec::new();
-        recording::encode(Kind::ViewPose, &[7; 900], &[], &mut poses);
+        recording::encode(Kind::Sightings, &[7; 900], &[], &mut poses);
         let body = join(&poses, b"maps");
         assert!(body.len() < 920, "{}", body.len());
         assert_eq!(split(&body), Some((poses.clone(), &b"maps"[..])));

@@ -194,7 +194,7 @@ pub(crate) fn job(resolved: &Resolved) -> Result<bridge::Job, Failure> {
         let others = deployment.hosts.iter().filter(|host| !host.fuses);
         let topic = |view: usize| match deployment.link.carry {
             Carry::Frames => topic::frame(view),
-            Carry::Poses => topic::view_pose(view),
+            Carry::Poses => topic::sightings(view),
         };
         let views = 0..prepared.views.len();
         bridge::Role::Near(bridge::Near {

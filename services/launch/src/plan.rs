@@ -9,7 +9,7 @@ use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Skeletons, ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Sightings, Skeletons, ViewQuality,
 };
 use runtime::{Delivery, HEARTBEAT, Limits, MOST_GUESTS, Namespace, TopicPlan, process_topics};
 use supervise::{Plan, Policy, ProcessSpec, Role};
@@ -203,7 +203,7 @@ fn topic_of(room: Room, delivery: Delivery) -> TopicPlan {
         Content::Evidence => {
             TopicPlan::slices::<f32, EvidenceHeader>(topic, delivery, limits, longest)
         }
-        Content::ViewPose => TopicPlan::messages::<ViewPose>(topic, delivery, limits),
+        Content::Sightings => TopicPlan::messages::<Sightings>(topic, delivery, limits),
         Content::ViewQuality => TopicPlan::messages::<ViewQuality>(topic, delivery, limits),
         Content::PairPose => TopicPlan::messages::<PairPose>(topic, delivery, limits),
         Content::People => TopicPlan::messages::<People>(topic, delivery, limits),

@@ -207,7 +207,7 @@ fn pose(service: &Service, resolved: &Resolved, view: usize) -> Result<(), Failu
         view,
         step: view_step::of_view(resolved, &prepared, view)?,
         n_extras: resolved.extra_keypoints.len(),
-        n_pose_consumers: topology.receivers_of(&topic::view_pose(view)),
+        n_pose_consumers: topology.receivers_of(&topic::sightings(view)),
         n_evidence_consumers: topology.receivers_of(&topic::evidence(view)),
         start_frame: resolved.deployment.capture.start_frame,
         frame_step: resolved.deployment.capture.frame_step,

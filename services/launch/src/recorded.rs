@@ -163,7 +163,7 @@ pub fn damaged(
     let has_evidence = from <= Stage::Fuse || topology.has_maps();
     let is_replayed = |topic: &str| match Kind::of_topic(topic) {
         Some(Kind::Frame) => from > Stage::Capture && has_frames,
-        Some(Kind::ViewPose) => from > Stage::Pose,
+        Some(Kind::Sightings) => from > Stage::Pose,
         Some(Kind::Evidence) => from > Stage::Pose && has_evidence,
         Some(Kind::ViewQuality) => from > Stage::Quality,
         Some(Kind::PairPose | Kind::People) => from > Stage::Fuse,

@@ -6,7 +6,7 @@ use crate::common;
 use std::fs;
 
 use common::{Case, Ended, PLAIN};
-use messages::{PairPose, ViewPose};
+use messages::{PairPose, Sightings};
 use serde_json::{Value, json};
 
 /// Runs a benchmark in the folder of a case, under the name of the case.
@@ -113,9 +113,9 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
         let camera = copied_bytes(&ended.stderr, &format!("capture-{view}"));
         assert_eq!(camera, 0, "it sends nothing but pixels");
         // The end of the stream is also a message.
-        let sent = (N_FRAMES + 1) * size_of::<ViewPose>();
+        let sent = (N_FRAMES + 1) * size_of::<Sightings>();
         let pose = copied_bytes(&ended.stderr, &format!("pose-{view}"));
-        let most = sent + 4 * size_of::<ViewPose>();
+        let most = sent + 4 * size_of::<Sightings>();
         assert!(
             (sent..=most).contains(&pose),
             "it reads pixels, and sends poses and evidence: {pose}"
@@ -125,10 +125,10 @@ fn a_deployment_copies_poses_and_neither_pixels_nor_evidence() {
     let evidence = report["recorded"]["summary"]["evidence_bytes_per_frame"].as_object();
     let evidence: u64 = evidence.unwrap().values().map(|value| value.as_u64().unwrap()).sum();
     let fuse = copied_bytes(&ended.stderr, "fuse-0");
-    let read = 2 * (N_FRAMES + 1) * size_of::<ViewPose>();
+    let read = 2 * (N_FRAMES + 1) * size_of::<Sightings>();
     let sent = (N_FRAMES + 1) * size_of::<PairPose>();
     // The end of the stream may be sent more than once.
-    let most = read + sent + 8 * size_of::<ViewPose>();
+    let most = read + sent + 8 * size_of::<Sightings>();
     assert!(
         (read + sent..=most).contains(&fuse),
         "it reads poses and evidence, and sends pairs: {fuse}"

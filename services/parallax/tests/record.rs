@@ -47,7 +47,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     assert_eq!(recording["lost"], json!(0), "{recording:#}");
     for topic in [
         "frame/v1/0",
-        "view-pose/v8/1",
+        "sightings/v1/1",
         "evidence/v4/2",
         "skeletons/v1",
     ] {
@@ -144,7 +144,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     recorded(&case, &["--without", "evidence", "--without", "pixels"]);
     let mut file = fs::read(case.path("run.mcap")).unwrap();
     let recording = recording::scan(&mut std::io::Cursor::new(&file)).unwrap();
-    let poses = &recording.tracks["view-pose/v8/1"].entries;
+    let poses = &recording.tracks["sightings/v1/1"].entries;
     let entry = poses.iter().find(|pose| pose.frame == Some(3)).unwrap();
     // This position is in the content, after the stamp and the times. Six changed bytes of a pose move a joint.
     let at = (entry.offset + entry.len / 2) as usize;
@@ -154,11 +154,11 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     let Entry { offset, chunk, .. } = entry;
-    let named = format!("view-pose/v8/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
+    let named = format!("sightings/v1/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
     assert!(ended.stderr.contains(&named), "{}", ended.stderr);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let expected =
-        json!({ "topic": "view-pose/v8/1", "frame": 3, "offset": offset, "chunk": chunk });
+        json!({ "topic": "sightings/v1/1", "frame": 3, "offset": offset, "chunk": chunk });
     let damaged = report["recording"]["damaged"].as_array().unwrap();
     assert!(damaged.contains(&expected), "{damaged:?}");
     assert!(
@@ -183,7 +183,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
 
     // The last frames of one view and all frames of the other cannot be read. The replay ends at the same frame as the run.
     for (view, from) in [(0, 4), (1, 0)] {
-        let poses = &recording.tracks[&format!("view-pose/v8/{view}")].entries;
+        let poses = &recording.tracks[&format!("sightings/v1/{view}")].entries;
         for entry in poses.iter().filter(|pose| pose.frame >= Some(from)) {
             let at = (entry.offset + entry.len / 2) as usize;
             file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x2a);

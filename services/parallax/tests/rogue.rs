@@ -13,8 +13,8 @@ use common::started::signal;
 use common::{Case, Ended, PACED, Started, last_taken, planted};
 use failure::{Stop, now_nanos};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, MAX_KEYPOINTS, PairPose, Searched, SkeletonMessage,
-    Skeletons, Stamp, Timing, ViewPose, topic,
+    EvidenceHeader, FrameHeader, Health, MAX_KEYPOINTS, PairPose, Searched, Sightings,
+    SkeletonMessage, Skeletons, Stamp, Timing, topic,
 };
 use runtime::{Bus, Namespace, PortError, Publisher, SlicePublisher, Waiter};
 use serde_json::Value;
@@ -155,7 +155,7 @@ fn send_wrong_evidence(
 }
 
 /// Makes one value of a pose wrong. The frame decides which one.
-fn with_wrong_content(mut pose: ViewPose) -> ViewPose {
+fn with_wrong_content(mut pose: Sightings) -> Sightings {
     let kind = pose.stamp.frame % 4;
     let candidate = &mut pose.candidates[0];
     candidate.n_parts = if kind == 0 { u16::MAX } else { 26 };
@@ -225,11 +225,11 @@ fn assert_all(refused: &BTreeSet<String>, processes: &[&str], causes: &[&str]) {
 #[test]
 fn a_foreign_process_cannot_publish_another_type_or_compete_with_the_right_sender() {
     let (case, started, rogue) = start("types", PACED);
-    let wrong_type = rogue.bus.publisher::<PairPose>(&topic::view_pose(0));
+    let wrong_type = rogue.bus.publisher::<PairPose>(&topic::sightings(0));
     assert!(matches!(wrong_type, Err(PortError::WrongType { .. })));
     let wrong_header = rogue.bus.slice_publisher::<u8, EvidenceHeader>(&topic::frame(0));
     assert!(matches!(wrong_header, Err(PortError::WrongType { .. })));
-    let second = rogue.bus.publisher::<ViewPose>(&topic::view_pose(0));
+    let second = rogue.bus.publisher::<Sightings>(&topic::sightings(0));
     assert!(matches!(second, Err(PortError::Publisher { .. })));
     drop(rogue);
     let ended = started.wait();
@@ -244,14 +244,14 @@ fn invalid_poses_and_evidence_are_refused() {
     // With lossless delivery, the run would wait for the frames that the killed process had received.
     let live = PACED.replace("\"paced\"", "\"realtime\"");
     let (case, mut started, rogue) = start("poses", &live);
-    let poses: Publisher<ViewPose> = rogue.replace(&mut started, "pose --index 1", |bus| {
-        bus.publisher(&topic::view_pose(1))
+    let poses: Publisher<Sightings> = rogue.replace(&mut started, "pose --index 1", |bus| {
+        bus.publisher(&topic::sightings(1))
     });
     let evidence: SlicePublisher<f32, EvidenceHeader> =
         until(|| rogue.bus.slice_publisher(&topic::evidence(1)).ok());
     let good = |frame: u64| {
         let (stamp, timing) = rogue.stamp(1, frame);
-        ViewPose {
+        Sightings {
             stamp,
             timing,
             n_candidates: 1,
@@ -259,7 +259,7 @@ fn invalid_poses_and_evidence_are_refused() {
             height: planted::SIZE[1],
             searched: Searched(u32::MAX),
             evidence_bytes: u64::MAX,
-            ..ViewPose::default()
+            ..Sightings::default()
         }
     };
     assert_eq!(poses.wait_for_subscribers(3, WATCHDOG), 3);
@@ -267,7 +267,7 @@ fn invalid_poses_and_evidence_are_refused() {
     // A realtime receiver may skip messages that are sent too fast.
     let pause = || std::thread::sleep(Duration::from_millis(100));
     for (stamp, timing) in rogue.wrong_stamps(1) {
-        let wrong = ViewPose {
+        let wrong = Sightings {
             stamp,
             timing,
             ..good(0)

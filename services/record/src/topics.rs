@@ -53,7 +53,7 @@ impl Topics {
             if !without.evidence {
                 add(Kind::Evidence, topic::evidence(view), None);
             }
-            add(Kind::ViewPose, topic::view_pose(view), from("pose"));
+            add(Kind::Sightings, topic::sightings(view), from("pose"));
             if self.has_quality {
                 add(
                     Kind::ViewQuality,
@@ -86,7 +86,7 @@ pub(crate) fn counted_by(counter: &Channel, channels: &[Channel]) -> Vec<usize> 
             let sender = other.sender.as_ref();
             sender.is_some_and(|sender| topic::health(sender) == counter.name)
         }
-        Kind::ViewPose => {
+        Kind::Sightings => {
             let view = |name: &str| name.rsplit('/').next().map(str::to_owned);
             other.kind == Kind::Evidence && view(&other.name) == view(&counter.name)
         }
@@ -125,7 +125,7 @@ mod tests {
         };
         let all = topics.channels(Without::default());
         let names: Vec<&str> = all.iter().map(|channel| channel.name.as_str()).collect();
-        let [near, far] = [0, 1].map(topic::view_pose);
+        let [near, far] = [0, 1].map(topic::sightings);
         assert!(names.contains(&near.as_str()) && names.contains(&far.as_str()));
         assert!(!names.contains(&topic::frame(1).as_str()), "{names:?}");
         let sender =
@@ -157,9 +157,9 @@ mod tests {
             let counted = counted_by(counter, &all).into_iter();
             counted.map(|index| all[index].name.clone()).collect::<Vec<_>>()
         };
-        assert_eq!(counted(&topic::health("pose-1")), [topic::view_pose(1)]);
+        assert_eq!(counted(&topic::health("pose-1")), [topic::sightings(1)]);
         assert_eq!(counted(&topic::health("fuse-0")), [topic::pair_pose(0)]);
-        assert_eq!(counted(&topic::view_pose(1)), [topic::evidence(1)]);
+        assert_eq!(counted(&topic::sightings(1)), [topic::evidence(1)]);
         assert_eq!(counted(&topic::picture(1)), [topic::picture(1)]);
         assert_eq!(counted(&topic::health("results")), Vec::<String>::new());
     }

@@ -2,8 +2,8 @@
 
 use fmp::Pose;
 use messages::{
-    FrameHeader, FusedView, PairPose, People, SkeletonMessage, Skeletons, Status, Timing, ViewPose,
-    ViewQuality,
+    FrameHeader, FusedView, PairPose, People, Sightings, SkeletonMessage, Skeletons, Status,
+    Timing, ViewQuality,
 };
 
 use pipeline::Sighting;
@@ -16,7 +16,7 @@ pub struct ViewRecord {
     /// The frame itself, without its pixels.
     pub frame: Option<FrameHeader>,
     /// Candidates of the view.
-    pub pose: Option<ViewPose>,
+    pub pose: Option<Sightings>,
     /// Expected errors of the view.
     pub quality: Option<ViewQuality>,
     /// Pixels of the frame, if a picture is to be drawn.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use messages::{FrameHeader, MAX_VIEWS, Skeletons, Status, ViewPose, ViewQuality};
+use messages::{FrameHeader, MAX_VIEWS, Sightings, Skeletons, Status, ViewQuality};
 
 use crate::missing::ViewHistory;
 use crate::{Absent, FrameRecord, FusedRecord, Missing, Picture, ViewRecord};
@@ -82,7 +82,7 @@ impl Gather {
         }
     }
 
-    pub(crate) fn pose(&mut self, view: usize, pose: &ViewPose) {
+    pub(crate) fn pose(&mut self, view: usize, pose: &Sightings) {
         if let Some(history) = self.histories.get_mut(view) {
             history.note_pose(pose);
         }
@@ -220,13 +220,13 @@ mod tests {
     use super::*;
     use crate::testing::skeletons;
 
-    fn pose(frame: u64) -> ViewPose {
-        ViewPose {
+    fn pose(frame: u64) -> Sightings {
+        Sightings {
             stamp: Stamp {
                 frame,
                 ..Stamp::default()
             },
-            ..ViewPose::default()
+            ..Sightings::default()
         }
     }
 

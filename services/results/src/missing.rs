@@ -1,6 +1,6 @@
 //! Reasons why a view does not contribute to a result.
 
-use messages::{FrameHeader, Status, ViewPose};
+use messages::{FrameHeader, Sightings, Status};
 
 /// Reason why a view does not contribute to a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +76,7 @@ impl ViewHistory {
     }
 
     /// Processes a pose, or the end of the stream.
-    pub(crate) fn note_pose(&mut self, pose: &ViewPose) {
+    pub(crate) fn note_pose(&mut self, pose: &Sightings) {
         self.lost_process = false;
         if pose.status == Status::END {
             self.end = Some(pose.stamp.frame);
@@ -104,7 +104,7 @@ impl ViewHistory {
     pub(crate) fn note_result(
         &mut self,
         frame: u64,
-        pose: Option<&ViewPose>,
+        pose: Option<&Sightings>,
         is_first: bool,
     ) -> Missing {
         let is_new = self.epoch != self.used_epoch;
@@ -136,15 +136,15 @@ mod tests {
 
     use super::*;
 
-    fn pose(frame: u64, epoch: u32, status: Status) -> ViewPose {
-        ViewPose {
+    fn pose(frame: u64, epoch: u32, status: Status) -> Sightings {
+        Sightings {
             stamp: Stamp {
                 frame,
                 epoch,
                 ..Stamp::default()
             },
             status,
-            ..ViewPose::default()
+            ..Sightings::default()
         }
     }
 

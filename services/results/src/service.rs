@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use failure::{Failure, now_nanos};
 use messages::{
-    Cause, FrameHeader, PairPose, People, Skeletons, Span, Status, ViewPose, ViewQuality, topic,
+    Cause, FrameHeader, PairPose, People, Sightings, Skeletons, Span, Status, ViewQuality, topic,
 };
 use runtime::{Service, SliceSubscriber, Subscriber, Waiter, Woken};
 use stage::{Context, Port, Sender};
@@ -115,7 +115,7 @@ fn record_latency(service: &Service, record: &FrameRecord) {
 /// The topics of the deployment.
 struct Ports {
     frames: Vec<SliceSubscriber<u8, FrameHeader>>,
-    poses: Vec<Port<Subscriber<ViewPose>>>,
+    poses: Vec<Port<Subscriber<Sightings>>>,
     qualities: Vec<Port<Subscriber<ViewQuality>>>,
     pairs: Vec<Port<Subscriber<PairPose>>>,
     people: Option<Port<Subscriber<People>>>,
@@ -136,7 +136,7 @@ impl Ports {
         for view in 0..job.scene.views.len() {
             let frames = service.bus().slice_subscriber(&topic::frame(view), waiter)?;
             ports.frames.push(frames);
-            let (poses, sender) = (topic::view_pose(view), Sender::View(view));
+            let (poses, sender) = (topic::sightings(view), Sender::View(view));
             ports.poses.push(Port::open(service, waiter, &poses, sender)?);
             if job.has_quality {
                 let errors = Port::open(service, waiter, &topic::view_quality(view), sender)?;
@@ -218,7 +218,7 @@ impl Ports {
             for frames in &self.frames {
                 while frames.receive()?.is_some() {}
             }
-            self.poses.iter().try_for_each(Port::drain::<ViewPose>)?;
+            self.poses.iter().try_for_each(Port::drain::<Sightings>)?;
             self.qualities.iter().try_for_each(Port::drain::<ViewQuality>)?;
             self.pairs.iter().try_for_each(Port::drain::<PairPose>)?;
             self.people.iter().try_for_each(Port::drain::<People>)?;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use fmp::{Filter, Layout, Model, ModelSpec, N_CHANNELS, PartSpec, Placement, Pose};
 use geometry::{Camera, Framing, Intrinsics, Lens, OutSize};
 use messages::{
-    FusedView, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS, SkeletonMessage, Skeletons, Status,
-    ViewPose,
+    FusedView, Joint3d, MAX_JOINTS, MAX_KEYPOINTS, MAX_VIEWS, Sightings, SkeletonMessage,
+    Skeletons, Status,
 };
 use nalgebra::{Isometry3, Vector3};
 
@@ -124,7 +124,7 @@ pub(crate) fn record(frame: u64) -> FrameRecord {
             mixture: 0,
         }],
     };
-    let message: ViewPose = wire::candidates_to_message(&[pose], [80, 60]).unwrap();
+    let message: Sightings = wire::candidates_to_message(&[pose], [80, 60]).unwrap();
     let view = ViewRecord {
         pose: Some(message),
         ..ViewRecord::default()

@@ -1,8 +1,8 @@
 //! Checks a message from another process before the program receives it.
 
 use messages::{
-    FrameHeader, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, SkeletonMessage,
-    Skeletons, Stamp, Status, ViewPose,
+    FrameHeader, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, Sightings,
+    SkeletonMessage, Skeletons, Stamp, Status,
 };
 use runfiles::Running;
 
@@ -48,7 +48,7 @@ fn skeleton(person: &SkeletonMessage, running: &Running) -> bool {
 }
 
 /// Returns true if the counts of a view's pose fit into the message.
-pub(crate) fn pose(message: &ViewPose) -> bool {
+pub(crate) fn pose(message: &Sightings) -> bool {
     let n_candidates = message.n_candidates as usize;
     let n_keypoints = message.n_keypoints as usize;
     n_candidates <= MAX_CANDIDATES
@@ -178,9 +178,9 @@ pub(crate) mod tests {
         fn any_bytes_are_accepted_or_refused_without_panic(bytes in prop::collection::vec(any::<u8>(), size_of::<Skeletons>())) {
             let message: Skeletons = bytemuck::pod_read_unaligned(&bytes);
             super::skeletons(&message, &running());
-            let n = size_of::<ViewPose>().min(bytes.len());
-            if n == size_of::<ViewPose>() {
-                let message: ViewPose = bytemuck::pod_read_unaligned(&bytes[..n]);
+            let n = size_of::<Sightings>().min(bytes.len());
+            if n == size_of::<Sightings>() {
+                let message: Sightings = bytemuck::pod_read_unaligned(&bytes[..n]);
                 pose(&message);
             }
         }

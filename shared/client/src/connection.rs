@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 use std::time::Instant;
 
-use messages::{FrameHeader, Skeletons, Status, ViewPose, topic};
+use messages::{FrameHeader, Sightings, Skeletons, Status, topic};
 use runfiles::Running;
 use runtime::{
     Guest, GuestError, GuestPort, Namespace, ReceiveError, running_deployments,
@@ -39,7 +39,7 @@ pub(crate) struct Connection {
 #[derive(Debug)]
 struct ViewPorts {
     view: usize,
-    poses: Option<GuestPort<ViewPose, ()>>,
+    poses: Option<GuestPort<Sightings, ()>>,
     pictures: Option<GuestPort<u8, FrameHeader>>,
 }
 
@@ -202,7 +202,7 @@ impl ViewPorts {
         Ok(Self {
             view,
             poses: if wish.poses {
-                Some(guest.port(&topic::view_pose(view))?)
+                Some(guest.port(&topic::sightings(view))?)
             } else {
                 None
             },

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use messages::{Skeletons, Stamp, ViewPose};
+use messages::{Sightings, Skeletons, Stamp};
 
 use crate::wish::Wish;
 
@@ -26,7 +26,7 @@ pub(crate) struct Gathered<P> {
 /// The parts of one view.
 #[derive(Debug)]
 pub(crate) struct Parts<P> {
-    pub(crate) pose: Option<Box<ViewPose>>,
+    pub(crate) pose: Option<Box<Sightings>>,
     pub(crate) picture: Option<P>,
 }
 
@@ -69,7 +69,7 @@ impl<P> Joiner<P> {
         }
     }
 
-    pub(crate) fn add_pose(&mut self, nth: usize, message: Box<ViewPose>, now: Instant) {
+    pub(crate) fn add_pose(&mut self, nth: usize, message: Box<Sightings>, now: Instant) {
         let frame = self.frame(&message.stamp, now);
         if let Some(parts) = frame.and_then(|frame| frame.views.get_mut(nth)) {
             parts.pose = Some(message);
@@ -175,8 +175,8 @@ mod tests {
         }
     }
 
-    fn pose(frame: u64) -> Box<ViewPose> {
-        let mut message = ViewPose::zeroed();
+    fn pose(frame: u64) -> Box<Sightings> {
+        let mut message = Sightings::zeroed();
         message.stamp = stamp(frame);
         Box::new(message)
     }

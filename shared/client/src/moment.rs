@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use messages::{FrameHeader, Joint3d, SkeletonMessage, Status, ViewPose};
+use messages::{FrameHeader, Joint3d, Sightings, SkeletonMessage, Status};
 use runfiles::Running;
 use runtime::Seen;
 
@@ -35,7 +35,7 @@ pub struct ViewMoment {
     pub view: usize,
     /// Poses from this view alone. The message has positions in cells of the pyramid. Positions in pixels after
     /// fusion are in [`Skeleton::centres_px`].
-    pub pose: Option<Box<ViewPose>>,
+    pub pose: Option<Box<Sightings>>,
     /// Picture of the view.
     pub picture: Option<Picture>,
 }

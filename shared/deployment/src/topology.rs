@@ -317,7 +317,7 @@ impl Builder<'_> {
             processes.extend(views().map(|view| self.quality(view)));
         }
         processes.extend(views().map(|view| {
-            let outputs = vec![topic::view_pose(view), topic::evidence(view)];
+            let outputs = vec![topic::sightings(view), topic::evidence(view)];
             process(
                 Stage::Pose.name(),
                 Some(view),
@@ -342,7 +342,7 @@ impl Builder<'_> {
     fn everything(&self) -> Vec<String> {
         let mut inputs = Vec::new();
         for view in 0..self.topology.n_views {
-            inputs.extend([topic::frame(view), topic::view_pose(view)]);
+            inputs.extend([topic::frame(view), topic::sightings(view)]);
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
         }
         inputs.extend(self.topology.fused());
@@ -352,7 +352,7 @@ impl Builder<'_> {
 
     fn triangulate(&self) -> Process {
         let views = || 0..self.topology.n_views;
-        let mut inputs: Vec<String> = views().map(topic::view_pose).collect();
+        let mut inputs: Vec<String> = views().map(topic::sightings).collect();
         inputs.extend(self.topology.fused());
         if self.topology.has_maps {
             inputs.extend(views().map(topic::evidence));
@@ -370,7 +370,7 @@ impl Builder<'_> {
     fn fuse(&self, worker: usize) -> Process {
         let mut inputs = Vec::new();
         for view in 0..self.topology.n_views {
-            inputs.push(topic::view_pose(view));
+            inputs.push(topic::sightings(view));
             let reads = !self.topology.has_maps && self.topology.reads(worker, view);
             inputs.extend(reads.then(|| topic::evidence(view)));
             inputs.extend(self.has_quality.then(|| topic::view_quality(view)));
@@ -385,7 +385,7 @@ impl Builder<'_> {
     }
 
     fn quality(&self, view: usize) -> Process {
-        let mut inputs = vec![topic::view_pose(view)];
+        let mut inputs = vec![topic::sightings(view)];
         inputs.extend(self.has_network.then(|| topic::frame(view)));
         let outputs = vec![topic::view_quality(view)];
         let service = Stage::Quality.name();

@@ -29,7 +29,7 @@ pub use metrics::{
 pub use people::{NO_CANDIDATE, People, PersonMessage};
 pub use picture::{NO_SEQUENCE, PictureHeader};
 pub use pose::{
-    LocalMessage, NO_COLOUR, PairHypothesis, PairPose, PoseMessage, Searched, ViewPose,
+    LocalMessage, NO_COLOUR, PairHypothesis, PairPose, PoseMessage, Searched, Sightings,
 };
 pub use quality::ViewQuality;
 pub use refusal::Refusal;
@@ -62,7 +62,7 @@ const _: () = {
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
     assert!(
-        size_of::<ViewPose>()
+        size_of::<Sightings>()
             == 1912 + MAX_CANDIDATES * (MAX_JOINTS + 1) * 12 + MAX_VIEW_KEYPOINTS * 12
     );
     assert!(size_of::<PersonMessage>() == 24);

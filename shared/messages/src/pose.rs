@@ -68,9 +68,9 @@ pub const NO_COLOUR: [f32; 3] = [-1.0; 3];
 
 /// The single-view result: distinct candidates, best first.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("ViewPose.v10")]
+#[type_name("Sightings.v1")]
 #[repr(C)]
-pub struct ViewPose {
+pub struct Sightings {
     /// Identity of the frame and the view.
     pub stamp: Stamp,
     /// Times at which the input arrived and the message was sent.
@@ -114,7 +114,7 @@ pub struct ViewPose {
     pub keypoints: [[f32; 3]; MAX_VIEW_KEYPOINTS],
 }
 
-impl Default for ViewPose {
+impl Default for Sightings {
     fn default() -> Self {
         Self::zeroed()
     }

@@ -16,10 +16,10 @@ pub fn picture(view: usize) -> String {
     format!("picture/v1/{view}")
 }
 
-/// Returns the topic for the single-view candidates of a view: [`ViewPose`](crate::ViewPose).
+/// Returns the topic for the single-view candidates of a view: [`Sightings`](crate::Sightings).
 #[must_use]
-pub fn view_pose(view: usize) -> String {
-    format!("view-pose/v8/{view}")
+pub fn sightings(view: usize) -> String {
+    format!("sightings/v1/{view}")
 }
 
 /// Returns the topic for the response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).

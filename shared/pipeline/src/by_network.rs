@@ -10,8 +10,8 @@ use posenetwork::{LookError, PersonMaps};
 use rayon::prelude::*;
 
 use crate::{
-    FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, Sightings, SpaceStep,
-    SpaceStepSettings, WhoSettings, WhoStep,
+    FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, SpaceStep, SpaceStepSettings,
+    ViewSightings, WhoSettings, WhoStep,
 };
 
 /// Settings of all steps except the single-view steps.
@@ -59,7 +59,7 @@ struct View {
 #[derive(Debug, Clone)]
 pub struct NetworkEstimate {
     /// The people seen by each view; `None` if the view is missing or nobody is seen in it.
-    pub sightings: Vec<Option<Sightings>>,
+    pub sightings: Vec<Option<ViewSightings>>,
     /// The identified people.
     pub people: FramePeople,
     /// The skeletons of the people, the followed person first.
@@ -115,7 +115,7 @@ impl NetworkEstimator {
     ) -> Result<NetworkEstimate, LookError> {
         let settings = &self.settings;
         let viewed = self.views.par_iter_mut().zip(frames);
-        let sightings: Result<Vec<Option<Sightings>>, LookError> = viewed
+        let sightings: Result<Vec<Option<ViewSightings>>, LookError> = viewed
             .map(|(view, content)| match content {
                 Some(content) => view.look(frame, settings, content),
                 None => Ok(None),
@@ -145,7 +145,7 @@ impl View {
         frame: u64,
         settings: &NetworkEstimatorSettings,
         content: &ViewFrame<'_>,
-    ) -> Result<Option<Sightings>, LookError> {
+    ) -> Result<Option<ViewSightings>, LookError> {
         match content.content {
             ViewContent::Picture(image) => {
                 self.memory.begin(frame, settings.most_apart);
@@ -155,7 +155,7 @@ impl View {
             ViewContent::Keypoints(people) => self.step.take(people.iter(), &mut self.memory),
         }
         let people = self.step.sightings(&mut self.memory);
-        Ok((!people.is_empty()).then_some(Sightings {
+        Ok((!people.is_empty()).then_some(ViewSightings {
             people,
             skew_s: content.skew_s,
         }))

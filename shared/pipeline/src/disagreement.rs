@@ -9,7 +9,7 @@ use skeleton::JointSet;
 
 use crate::bodies::NoJoint;
 use crate::motion::Motion;
-use crate::sighting::Sightings;
+use crate::sighting::ViewSightings;
 
 /// Maximum median distance, in metres, between a view's joints and the result; beyond it, the view shows another person.
 const SAME_PERSON_M: f64 = 0.25;
@@ -24,7 +24,7 @@ const NOISE_SHARE: f64 = 0.5;
 #[derive(Clone, Copy)]
 pub(crate) struct FoundByViews<'a> {
     pub(crate) plans: &'a [Arc<ViewPlan>],
-    pub(crate) answers: &'a [Option<Sightings>],
+    pub(crate) answers: &'a [Option<ViewSightings>],
     /// For every view, true if the view contributed to the result.
     pub(crate) takes_part: &'a [bool],
     /// Minimum heat that half of a candidate's joints must have, if its view did not contribute to the result. Such a view then counts as
@@ -161,7 +161,7 @@ fn median(values: &[f64]) -> Option<f64> {
 fn readings<'a>(
     found_by: &FoundByViews<'a>,
     view: usize,
-    answer: &'a Sightings,
+    answer: &'a ViewSightings,
 ) -> impl Iterator<Item = (f64, Vec<[f64; 2]>)> + 'a {
     let has_part = found_by.takes_part.get(view) == Some(&true);
     let least_heat = found_by.least_heat;

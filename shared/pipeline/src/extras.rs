@@ -11,7 +11,7 @@ use skeleton::{PARSE14, SIDES};
 use crate::bodies::NoJoint;
 use crate::fused_view::FusedView;
 use crate::motion::Motion;
-use crate::sighting::Sightings;
+use crate::sighting::ViewSightings;
 use crate::skeleton_step::Skeleton;
 use crate::space::by_view;
 use crate::view_result::ExtraKeypoint;
@@ -92,7 +92,7 @@ impl ExtrasStep {
     pub fn run(
         &self,
         skeleton: &Skeleton,
-        views: &[Option<Sightings>],
+        views: &[Option<ViewSightings>],
         motion: &mut Motion,
     ) -> Vec<Result<Triangulated, NoJoint>> {
         let each = views.iter().zip(&skeleton.views).enumerate();
@@ -115,7 +115,7 @@ impl ExtrasStep {
     }
 
     /// Returns the candidate of a view that shows the person.
-    fn person(&self, view: usize, found: &Sightings, fused: &FusedView) -> Option<Match> {
+    fn person(&self, view: usize, found: &ViewSightings, fused: &FusedView) -> Option<Match> {
         if fused.pose.centres_px.len() != skeleton::N_PARTS {
             return None;
         }

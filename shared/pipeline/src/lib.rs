@@ -50,7 +50,7 @@ pub use look_budget::{LookBudget, Spent};
 pub use motion::Motion;
 pub use network_memory::{LOST, NetworkMemory};
 pub use network_step::{Eyes, NetworkSettings, NetworkStep, most_values};
-pub use sighting::{Sighting, Sightings, parts_of};
+pub use sighting::{Sighting, ViewSightings, parts_of};
 pub use skeleton_settings::{BodySettings, Combine, SkeletonSettings};
 pub use skeleton_step::{Kept, Skeleton, SkeletonStep};
 pub use space_settings::SpaceStepSettings;

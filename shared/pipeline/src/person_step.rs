@@ -17,7 +17,7 @@ use crate::fused_view::FusedView;
 use crate::motion::Motion;
 use crate::person_evidence::PersonEvidence;
 use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
-use crate::sighting::{Sighting, Sightings};
+use crate::sighting::{Sighting, ViewSightings};
 use crate::skeleton_step::{Kept, Skeleton};
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
@@ -41,7 +41,7 @@ pub(crate) struct Rig {
 #[derive(Clone, Copy)]
 pub(crate) struct FrameViews<'f, 'a> {
     /// Sightings of each view.
-    pub(crate) answers: &'f [Option<Sightings>],
+    pub(crate) answers: &'f [Option<ViewSightings>],
     /// Maps of the people of each view. A view without sightings or maps does not contribute.
     pub(crate) evidence: &'f [Vec<PersonMaps<'a>>],
     pub(crate) people: &'f FramePeople,
@@ -278,7 +278,7 @@ impl PersonStep {
     /// Returns the poses of a solution in the views that contribute to it.
     fn views(
         &self,
-        answers: &[Option<Sightings>],
+        answers: &[Option<ViewSightings>],
         solution: Option<&Solution<'_>>,
     ) -> Vec<Option<FusedView>> {
         let mut views = vec![None; self.rig.plans.len()];

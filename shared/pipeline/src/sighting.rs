@@ -32,7 +32,7 @@ pub struct Sighting {
 
 /// The people that one view sees in a frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sightings {
+pub struct ViewSightings {
     /// The people, the largest and clearest first; never empty.
     pub people: Vec<Sighting>,
     /// Time of the picture after the instant of the frame, in seconds; negative if it was taken before.

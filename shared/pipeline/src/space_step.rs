@@ -7,7 +7,7 @@ use nalgebra::UnitVector3;
 use posenetwork::PersonMaps;
 
 use crate::person_step::{FrameViews, PersonStep, Rig};
-use crate::sighting::Sightings;
+use crate::sighting::ViewSightings;
 use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
 use crate::who::FramePeople;
@@ -63,7 +63,7 @@ impl SpaceStep {
         }
     }
 
-    /// Begins a frame whose pictures may not have been taken at its instant ([`Sightings::skew_s`]). The points of the views are then moved
+    /// Begins a frame whose pictures may not have been taken at its instant ([`ViewSightings::skew_s`]). The points of the views are then moved
     /// to the instant. Without this call, or if all pictures were taken at the instant, nothing is moved.
     ///
     /// * `instant_s`: instant of the frame, in seconds; `None` if the frame rate is unknown.
@@ -78,7 +78,7 @@ impl SpaceStep {
     ///   contribute.
     pub fn run(
         &mut self,
-        answers: &[Option<Sightings>],
+        answers: &[Option<ViewSightings>],
         evidence: &[Vec<PersonMaps<'_>>],
         people: &FramePeople,
     ) -> Vec<PersonSkeleton> {

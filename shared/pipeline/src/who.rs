@@ -6,7 +6,7 @@ use posenetwork::expected_error;
 
 use crate::following::Follow;
 use crate::network_step::NetworkSettings;
-use crate::sighting::{Sighting, Sightings};
+use crate::sighting::{Sighting, ViewSightings};
 
 /// Size of the network's window around a person, as a multiple of the longer side of the box around the joints.
 const WINDOW: f64 = 1.25;
@@ -123,7 +123,7 @@ impl WhoStep {
     ///
     /// * `time_s`: time at which the frame was taken, in seconds; not earlier than the time of the last frame.
     /// * `answers`: the sightings of each view.
-    pub fn run(&mut self, time_s: f64, answers: &[Option<Sightings>]) -> FramePeople {
+    pub fn run(&mut self, time_s: f64, answers: &[Option<ViewSightings>]) -> FramePeople {
         let views: Vec<View> = answers.iter().map(|seen| view(seen.as_ref())).collect();
         let mut found = self.tracker.step(time_s, &views);
         let is_seen = |person: &Person| {
@@ -150,7 +150,7 @@ impl WhoStep {
     }
 
     /// Chooses the person who is followed.
-    fn choose(&mut self, found: &[Person], answers: &[Option<Sightings>]) {
+    fn choose(&mut self, found: &[Person], answers: &[Option<ViewSightings>]) {
         let is_known = found.iter().any(|person| person.id == self.followed);
         if self.follow == Follow::Last && is_known {
             return;
@@ -182,7 +182,7 @@ fn longer_px(sighting: &Sighting) -> f64 {
 }
 
 /// Converts the sightings of a view to detections with their standard deviations.
-fn view(seen: Option<&Sightings>) -> View {
+fn view(seen: Option<&ViewSightings>) -> View {
     let detection = |sighting: &Sighting| {
         let window_px = WINDOW * longer_px(sighting);
         let moved_px = SPEED * longer_px(sighting) * f64::from(sighting.age_s);

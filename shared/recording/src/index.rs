@@ -120,7 +120,7 @@ mod tests {
     fn track(times: &[u64], offset: u64) -> Track {
         let entries = times.iter().zip(offset..);
         Track {
-            kind: Kind::ViewPose,
+            kind: Kind::Sightings,
             entries: entries
                 .map(|(&publish_time, offset)| Entry {
                     log_time: 0,

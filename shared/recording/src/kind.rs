@@ -1,8 +1,8 @@
 //! The message types of topics: their sizes and schemas.
 
 use messages::{
-    EvidenceHeader, FrameHeader, Health, MAX_PEOPLE, PairPose, People, PictureHeader,
-    SkeletonMessage, Skeletons, ViewPose, ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, MAX_PEOPLE, PairPose, People, PictureHeader, Sightings,
+    SkeletonMessage, Skeletons, ViewQuality, topic,
 };
 
 /// A type of message.
@@ -13,7 +13,7 @@ pub enum Kind {
     /// Response maps of a view.
     Evidence,
     /// Single-view candidates.
-    ViewPose,
+    Sightings,
     /// Expected errors of a view.
     ViewQuality,
     /// Results of a fusion worker.
@@ -47,7 +47,7 @@ impl Kind {
     pub const ALL: [Self; 9] = [
         Self::Frame,
         Self::Evidence,
-        Self::ViewPose,
+        Self::Sightings,
         Self::ViewQuality,
         Self::PairPose,
         Self::People,
@@ -76,7 +76,7 @@ impl Kind {
         match self {
             Self::Frame => topic::frame(0),
             Self::Evidence => topic::evidence(0),
-            Self::ViewPose => topic::view_pose(0),
+            Self::Sightings => topic::sightings(0),
             Self::ViewQuality => topic::view_quality(0),
             Self::PairPose => topic::pair_pose(0),
             Self::People => topic::people(),
@@ -92,7 +92,7 @@ impl Kind {
         match self {
             Self::Frame => size_of::<FrameHeader>(),
             Self::Evidence => size_of::<EvidenceHeader>(),
-            Self::ViewPose => size_of::<ViewPose>(),
+            Self::Sightings => size_of::<Sightings>(),
             Self::ViewQuality => size_of::<ViewQuality>(),
             Self::PairPose => size_of::<PairPose>(),
             Self::People => size_of::<People>(),
@@ -125,7 +125,7 @@ impl Kind {
         match self {
             Self::Frame => Some(core::mem::offset_of!(FrameHeader, status)),
             Self::Evidence => Some(core::mem::offset_of!(EvidenceHeader, status)),
-            Self::ViewPose => Some(core::mem::offset_of!(ViewPose, status)),
+            Self::Sightings => Some(core::mem::offset_of!(Sightings, status)),
             Self::ViewQuality => Some(core::mem::offset_of!(ViewQuality, status)),
             Self::PairPose => Some(core::mem::offset_of!(PairPose, status)),
             Self::People => Some(core::mem::offset_of!(People, status)),
@@ -140,7 +140,7 @@ impl Kind {
         match self {
             Self::Frame => "parallax/msg/Frame",
             Self::Evidence => "parallax/msg/Evidence",
-            Self::ViewPose => "parallax/msg/ViewPose",
+            Self::Sightings => "parallax/msg/Sightings",
             Self::ViewQuality => "parallax/msg/ViewQuality",
             Self::PairPose => "parallax/msg/PairPose",
             Self::People => "parallax/msg/People",
@@ -154,7 +154,7 @@ impl Kind {
         match self {
             Self::Frame => include_str!("../msg/Frame.msg"),
             Self::Evidence => include_str!("../msg/Evidence.msg"),
-            Self::ViewPose => include_str!("../msg/ViewPose.msg"),
+            Self::Sightings => include_str!("../msg/Sightings.msg"),
             Self::ViewQuality => include_str!("../msg/ViewQuality.msg"),
             Self::PairPose => include_str!("../msg/PairPose.msg"),
             Self::People => include_str!("../msg/People.msg"),
@@ -255,10 +255,10 @@ mod tests {
 
     #[test]
     fn a_topic_of_another_version_is_distinguished_from_an_unknown_topic() {
-        assert!(Kind::ViewPose.is_of_another_version("view-pose/v5/0"));
+        assert!(Kind::Sightings.is_of_another_version("sightings/v5/0"));
         assert!(Kind::Skeletons.is_of_another_version("skeletons/v0"));
-        for other in ["view-pose/v8/0", "skeletons/v0", "metrics/v0/a", "camera"] {
-            assert!(!Kind::ViewPose.is_of_another_version(other), "{other}");
+        for other in ["sightings/v1/0", "skeletons/v0", "metrics/v0/a", "camera"] {
+            assert!(!Kind::Sightings.is_of_another_version(other), "{other}");
         }
     }
 

@@ -174,7 +174,7 @@ impl Envelope {
 #[cfg(test)]
 mod tests {
     use messages::{
-        EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, ViewPose, ViewQuality,
+        EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Sightings, ViewQuality,
     };
     use proptest::prelude::*;
 
@@ -200,7 +200,7 @@ mod tests {
     /// Returns the bytes of messages with this envelope, one for every kind that has an envelope.
     fn heads(it: Envelope) -> Vec<(Kind, Vec<u8>)> {
         let (mut frame, mut evidence) = (FrameHeader::default(), EvidenceHeader::default());
-        let (mut pose, mut quality) = (ViewPose::default(), ViewQuality::default());
+        let (mut pose, mut quality) = (Sightings::default(), ViewQuality::default());
         let (mut pair, mut skeletons) = (PairPose::default(), Skeletons::default());
         let (mut people, mut picture) = (People::default(), PictureHeader::default());
         (people.stamp, people.timing, people.status) = (it.stamp, it.timing, it.status);
@@ -214,7 +214,7 @@ mod tests {
         let heads = [
             (Kind::Frame, bytes_of(&frame)),
             (Kind::Evidence, bytes_of(&evidence)),
-            (Kind::ViewPose, bytes_of(&pose)),
+            (Kind::Sightings, bytes_of(&pose)),
             (Kind::ViewQuality, bytes_of(&quality)),
             (Kind::PairPose, bytes_of(&pair)),
             (Kind::People, bytes_of(&people)),

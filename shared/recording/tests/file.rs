@@ -18,7 +18,7 @@ type Sent = (usize, u64, Vec<u8>);
 fn topics() -> Vec<String> {
     vec![
         topic::frame(0),
-        topic::view_pose(0),
+        topic::sightings(0),
         topic::health("pose-0"),
     ]
 }
@@ -33,7 +33,7 @@ fn about() -> About {
 }
 
 fn kind(topic: usize) -> Kind {
-    [Kind::Frame, Kind::ViewPose, Kind::Health][topic]
+    [Kind::Frame, Kind::Sightings, Kind::Health][topic]
 }
 
 /// Returns the bytes of a message; its frame number is its time.

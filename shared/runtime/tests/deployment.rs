@@ -7,7 +7,7 @@ use std::os::unix::fs::MetadataExt as _;
 
 use common::{Deployment, shared_memory};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, Skeletons, ViewPose, ViewQuality, topic,
+    EvidenceHeader, FrameHeader, Health, PairPose, Sightings, Skeletons, ViewQuality, topic,
 };
 use runtime::{
     Bus, Delivery, Limits, Publisher, SlicePublisher, SliceSubscriber, Subscriber, TopicPlan,
@@ -38,11 +38,11 @@ fn topics(delivery: Delivery) -> Vec<TopicPlan> {
         let evidence = topic::evidence(view);
         let evidence =
             TopicPlan::slices::<f32, EvidenceHeader>(evidence, delivery, large(N_WORKERS), 50_000);
-        let (pose, quality) = (topic::view_pose(view), topic::view_quality(view));
+        let (pose, quality) = (topic::sightings(view), topic::view_quality(view));
         topics.extend([
             frames,
             evidence.with_few_chunks(3),
-            TopicPlan::messages::<ViewPose>(pose, delivery, small(N_WORKERS + 3)),
+            TopicPlan::messages::<Sightings>(pose, delivery, small(N_WORKERS + 3)),
             TopicPlan::messages::<ViewQuality>(quality, delivery, small(N_WORKERS + 1)),
         ]);
     }
@@ -65,8 +65,8 @@ struct Ports {
     frames_in: Vec<SliceSubscriber<u8, FrameHeader>>,
     evidence_out: Vec<SlicePublisher<f32, EvidenceHeader>>,
     evidence_in: Vec<SliceSubscriber<f32, EvidenceHeader>>,
-    poses_out: Vec<Publisher<ViewPose>>,
-    poses_in: Vec<Subscriber<ViewPose>>,
+    poses_out: Vec<Publisher<Sightings>>,
+    poses_in: Vec<Subscriber<Sightings>>,
     quality_out: Vec<Publisher<ViewQuality>>,
     quality_in: Vec<Subscriber<ViewQuality>>,
     pairs_out: Vec<Publisher<PairPose>>,
@@ -89,7 +89,7 @@ impl Ports {
             "pose" => self.open_pose(&bus, &mut waiter, index),
             "quality" => {
                 self.poses_in
-                    .push(bus.subscriber(&topic::view_pose(index), &mut waiter).unwrap());
+                    .push(bus.subscriber(&topic::sightings(index), &mut waiter).unwrap());
                 self.quality_out.push(bus.publisher(&topic::view_quality(index)).unwrap());
             }
             "fuse" => self.open_fuse(&bus, &mut waiter, index),
@@ -100,7 +100,7 @@ impl Ports {
 
     fn open_pose(&mut self, bus: &Bus, waiter: &mut Waiter, view: usize) {
         self.frames_in.push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
-        self.poses_out.push(bus.publisher(&topic::view_pose(view)).unwrap());
+        self.poses_out.push(bus.publisher(&topic::sightings(view)).unwrap());
         self.evidence_out.push(bus.slice_publisher(&topic::evidence(view)).unwrap());
     }
 
@@ -108,7 +108,7 @@ impl Ports {
         for view in 0..N_VIEWS {
             self.evidence_in
                 .push(bus.slice_subscriber(&topic::evidence(view), waiter).unwrap());
-            self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            self.poses_in.push(bus.subscriber(&topic::sightings(view), waiter).unwrap());
             self.quality_in
                 .push(bus.subscriber(&topic::view_quality(view), waiter).unwrap());
         }
@@ -118,7 +118,7 @@ impl Ports {
     /// Opens the ports of the service `triangulate`, which publishes the result, and of `record`, which receives everything.
     fn open_last(&mut self, bus: &Bus, waiter: &mut Waiter, records: bool) {
         for view in 0..N_VIEWS {
-            self.poses_in.push(bus.subscriber(&topic::view_pose(view), waiter).unwrap());
+            self.poses_in.push(bus.subscriber(&topic::sightings(view), waiter).unwrap());
             if records {
                 self.frames_in.push(bus.slice_subscriber(&topic::frame(view), waiter).unwrap());
                 self.quality_in
@@ -155,7 +155,10 @@ fn a_deployment_of_eight_views_opens_all_ports_within_its_memory_plan() {
             assert_eq!(publisher.loan(50_000).unwrap().send().unwrap(), N_WORKERS);
         }
         for publisher in &ports.poses_out {
-            assert_eq!(publisher.send(&ViewPose::default()).unwrap(), N_WORKERS + 3);
+            assert_eq!(
+                publisher.send(&Sightings::default()).unwrap(),
+                N_WORKERS + 3
+            );
         }
         let used: u64 = shared_memory(deployment.namespace())
             .iter()

@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 use common::{Deployment, namespace};
 use failure::{Fault as _, Stop};
-use messages::{FrameHeader, ViewPose};
+use messages::{FrameHeader, Sightings};
 use runtime::{Bus, BusError, Delivery, Limits, LockError, Namespace, PrivacyError, TopicPlan};
 use rustix::fs::Mode;
 use rustix::process::{getuid, umask};
@@ -44,16 +44,16 @@ fn all_files(deployment: &Deployment) -> Vec<PathBuf> {
 fn with_ports(use_it: impl FnOnce(&Deployment)) {
     let limits = Limits::new(1, 1, 1);
     let deployment = Deployment::new(&[
-        TopicPlan::messages::<ViewPose>("pose".to_owned(), Delivery::Lossless, limits),
+        TopicPlan::messages::<Sightings>("pose".to_owned(), Delivery::Lossless, limits),
         TopicPlan::slices::<u8, FrameHeader>("frame".to_owned(), Delivery::Realtime, limits, 99),
     ]);
     let bus = deployment.bus("one");
     let mut waiter = bus.waiter();
-    let poses = bus.subscriber::<ViewPose>("pose", &mut waiter).unwrap();
+    let poses = bus.subscriber::<Sightings>("pose", &mut waiter).unwrap();
     let frames = bus.slice_subscriber::<u8, FrameHeader>("frame", &mut waiter);
-    let to_poses = bus.publisher::<ViewPose>("pose").unwrap();
+    let to_poses = bus.publisher::<Sightings>("pose").unwrap();
     let to_frames = bus.slice_publisher::<u8, FrameHeader>("frame").unwrap();
-    to_poses.send(&ViewPose::default()).unwrap();
+    to_poses.send(&Sightings::default()).unwrap();
     to_frames.loan(9).unwrap().send().unwrap();
     use_it(&deployment);
     drop((poses, frames, to_poses, to_frames));

@@ -1,7 +1,7 @@
 //! The fields that all messages share.
 
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, Skeletons, Stamp, Status, Timing, ViewPose,
+    EvidenceHeader, FrameHeader, PairPose, People, Sightings, Skeletons, Stamp, Status, Timing,
     ViewQuality,
 };
 
@@ -53,7 +53,7 @@ macro_rules! stamped {
 }
 
 stamped! {
-    ViewPose => "view-pose", Self::default();
+    Sightings => "sightings", Self::default();
     ViewQuality => "view-quality", Self::default();
     PairPose => "pair-pose", Self::default();
     People => "people", Self::default();

@@ -3,7 +3,7 @@
 use fmp::{Layout, LocalScore, Model, Placement, Pose};
 use messages::{
     LocalMessage, MAX_CANDIDATES, MAX_KEYPOINTS, MAX_PARTS, MAX_VIEW_KEYPOINTS, PoseMessage,
-    Status, ViewPose,
+    Sightings, Status,
 };
 use multiview::FrontEvidence;
 use pipeline::ExtraKeypoint;
@@ -80,9 +80,9 @@ pub fn pose_from_message(
 pub fn candidates_to_message(
     candidates: &[Pose],
     image_size: [usize; 2],
-) -> Result<ViewPose, WireError> {
+) -> Result<Sightings, WireError> {
     let n_candidates = count("n_candidates", candidates.len(), MAX_CANDIDATES)?;
-    let mut message = ViewPose {
+    let mut message = Sightings {
         status: if n_candidates == 0 {
             Status::NO_DETECTION
         } else {
@@ -91,7 +91,7 @@ pub fn candidates_to_message(
         n_candidates: n_candidates as u32,
         width: image_size[0] as u32,
         height: image_size[1] as u32,
-        ..ViewPose::default()
+        ..Sightings::default()
     };
     for (slot, pose) in message.candidates.iter_mut().zip(candidates) {
         *slot = pose_to_message(pose)?;
@@ -105,7 +105,7 @@ pub fn candidates_to_message(
 ///
 /// Returns a [`WireError`] if the image size is not that of `layout`, or if a candidate is malformed.
 pub fn candidates_from_message(
-    message: &ViewPose,
+    message: &Sightings,
     model: &Model,
     layout: &Layout,
 ) -> Result<Vec<Pose>, WireError> {
@@ -130,7 +130,7 @@ pub fn candidates_from_message(
 /// # Errors
 ///
 /// Returns [`WireError::Frame`] if it is more than ten seconds.
-pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
+pub fn skew_from_message(message: &Sightings) -> Result<f64, WireError> {
     at_most(
         "skew_nanos",
         message.skew_nanos.unsigned_abs(),
@@ -144,7 +144,7 @@ pub fn skew_from_message(message: &ViewPose) -> Result<f64, WireError> {
 /// # Errors
 ///
 /// Returns a [`WireError`] if there are more entries than the message has room for candidates, or if a number is not finite.
-pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Result<(), WireError> {
+pub fn front_to_message(message: &mut Sightings, front: &[FrontEvidence]) -> Result<(), WireError> {
     count("front", front.len(), MAX_CANDIDATES)?;
     for (candidate, (slot, evidence)) in message.front.iter_mut().zip(front).enumerate() {
         *slot = checked_front(candidate, *evidence)?;
@@ -160,7 +160,7 @@ pub fn front_to_message(message: &mut ViewPose, front: &[FrontEvidence]) -> Resu
 ///
 /// Returns a [`WireError`] if there are more than [`MAX_CANDIDATES`] candidates, or if a number is not finite.
 pub fn front_from_message(
-    message: &ViewPose,
+    message: &Sightings,
     n_candidates: usize,
 ) -> Result<Vec<FrontEvidence>, WireError> {
     let n = count("front", n_candidates, MAX_CANDIDATES)?;
@@ -183,7 +183,7 @@ fn checked_front(candidate: usize, evidence: FrontEvidence) -> Result<FrontEvide
 ///
 /// Returns a [`WireError`] if a candidate has more than [`MAX_KEYPOINTS`] keypoints, or if a number is not finite.
 pub fn extras_to_message(
-    message: &mut ViewPose,
+    message: &mut Sightings,
     n: usize,
     extras: &[ExtraKeypoint],
 ) -> Result<(), WireError> {
@@ -212,7 +212,7 @@ fn room_of(n: usize) -> usize {
 ///
 /// Returns a [`WireError`] if the number of keypoints is not that of the deployment, or if a number is not finite.
 pub fn extras_from_message(
-    message: &ViewPose,
+    message: &Sightings,
     n: usize,
     n_candidates: usize,
 ) -> Result<Vec<ExtraKeypoint>, WireError> {
@@ -239,7 +239,7 @@ fn checked_extra(entry: usize, it: &[f32; 3]) -> Result<ExtraKeypoint, WireError
 /// # Errors
 ///
 /// Returns a [`WireError`] if there are more than [`MAX_PARTS`] scores, or if a number is not finite.
-pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result<(), WireError> {
+pub fn local_to_message(message: &mut Sightings, scores: &[LocalScore]) -> Result<(), WireError> {
     count("local", scores.len(), MAX_PARTS)?;
     for (part, (slot, score)) in message.local.iter_mut().zip(scores).enumerate() {
         let LocalScore {
@@ -262,7 +262,7 @@ pub fn local_to_message(message: &mut ViewPose, scores: &[LocalScore]) -> Result
 ///
 /// Returns a [`WireError`] if there are more than [`MAX_PARTS`] parts, or if a number is not finite.
 pub fn local_from_message(
-    message: &ViewPose,
+    message: &Sightings,
     n_parts: usize,
 ) -> Result<Vec<LocalScore>, WireError> {
     let n = count("local", n_parts, MAX_PARTS)?;
@@ -297,7 +297,7 @@ mod tests {
         let extras: Vec<ExtraKeypoint> = (0..500_u32)
             .map(|i| (i % 3 > 0).then_some(([f64::from(i), 2.0], 0.5)))
             .collect();
-        let mut message = ViewPose::default();
+        let mut message = Sightings::default();
         extras_to_message(&mut message, 100, &extras).unwrap();
         let back = extras_from_message(&message, 100, 5).unwrap();
         assert_eq!(back, extras[..300], "there is room for three");
@@ -340,13 +340,13 @@ mod tests {
                     prop_assert!(usize::from(part.x) < level.cols && usize::from(part.y) < level.rows);
                 }
             }
-            let view = ViewPose {
+            let view = Sightings {
                 status: Status(status),
                 n_candidates,
                 width: 80,
                 height: 60,
                 candidates: [message; MAX_CANDIDATES],
-                ..ViewPose::default()
+                ..Sightings::default()
             };
             if let Ok(poses) = candidates_from_message(&view, &model, &layout) {
                 prop_assert!(poses.len() <= MAX_CANDIDATES);
@@ -361,7 +361,7 @@ mod tests {
             contrast: -2.0,
             margin: 0.25,
         };
-        let mut message = ViewPose::default();
+        let mut message = Sightings::default();
         local_to_message(&mut message, &[score, LocalScore::default(), score]).unwrap();
         let back = local_from_message(&message, 3).unwrap();
         assert_eq!(back, [score, LocalScore::default(), score]);

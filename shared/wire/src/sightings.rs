@@ -1,7 +1,7 @@
 //! The people that a view sees with the network method, and their maps.
 
-use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, NO_COLOUR, Status, ViewPose};
-use pipeline::{ExtraKeypoint, Sighting, Sightings};
+use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, NO_COLOUR, Sightings, Status};
+use pipeline::{ExtraKeypoint, Sighting, ViewSightings};
 use posenetwork::{MapGrid, MapSettings, PersonMaps};
 
 use crate::error::{count, equal, finite};
@@ -30,9 +30,9 @@ pub fn sightings_to_message(
     people: &[Sighting],
     n_extras: usize,
     image_size: [usize; 2],
-) -> Result<ViewPose, WireError> {
+) -> Result<Sightings, WireError> {
     let n = count("n_candidates", people.len(), MAX_CANDIDATES)?;
-    let mut message = ViewPose {
+    let mut message = Sightings {
         status: if n == 0 {
             Status::NO_DETECTION
         } else {
@@ -41,7 +41,7 @@ pub fn sightings_to_message(
         n_candidates: n as u32,
         width: image_size[0] as u32,
         height: image_size[1] as u32,
-        ..ViewPose::default()
+        ..Sightings::default()
     };
     for (nth, person) in people.iter().enumerate() {
         message.candidates[nth].score = person.score;
@@ -69,9 +69,9 @@ pub fn sightings_to_message(
 ///
 /// Returns a [`WireError`] if there are more people than fit, or if a number or the time of the picture is impossible.
 pub fn sightings_from_message(
-    message: &ViewPose,
+    message: &Sightings,
     n_extras: usize,
-) -> Result<Option<Sightings>, WireError> {
+) -> Result<Option<ViewSightings>, WireError> {
     if message.status != Status::OK {
         return Ok(None);
     }
@@ -108,11 +108,11 @@ pub fn sightings_from_message(
         people.push(person);
     }
     let skew_s = skew_from_message(message)?;
-    Ok((n > 0).then_some(Sightings { people, skew_s }))
+    Ok((n > 0).then_some(ViewSightings { people, skew_s }))
 }
 
 /// Reads the colour of a person's trunk.
-fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]>, WireError> {
+fn colour_from_message(message: &Sightings, nth: usize) -> Result<Option<[f32; 3]>, WireError> {
     let colour = message.colours[nth];
     if colour.map(f32::to_bits) == NO_COLOUR.map(f32::to_bits) {
         return Ok(None);
@@ -124,7 +124,7 @@ fn colour_from_message(message: &ViewPose, nth: usize) -> Result<Option<[f32; 3]
 }
 
 /// Reads the time since the network last ran on a person.
-fn age_from_message(message: &ViewPose, nth: usize) -> Result<f32, WireError> {
+fn age_from_message(message: &Sightings, nth: usize) -> Result<f32, WireError> {
     let age_s = message.ages_s[nth];
     if (0.0..=MOST_AGE_S).contains(&age_s) {
         return Ok(age_s);

@@ -41,7 +41,7 @@ pub fn host_messages(input: &[u8]) {
 
 /// Arbitrary numbers in a packet with a correct hash: the packet is either refused, or read as it was sent.
 fn packet_of(mut it: Numbers<'_>, body: &[u8]) {
-    let contents = [Content::Frame, Content::ViewPose, Content::ViewQuality];
+    let contents = [Content::Frame, Content::Sightings, Content::ViewQuality];
     let head = Head {
         content: contents[(it.next() % 3) as usize],
         view: it.next() as u32,

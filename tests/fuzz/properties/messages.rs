@@ -10,7 +10,7 @@ use geometry::{Camera, Intrinsics, Lens};
 use kernels::Rgb8View;
 use messages::{
     EvidenceHeader, FrameHeader, MAX_CANDIDATES, MAX_JOINTS, MAX_KEYPOINTS, MAX_LEVELS, MAX_PARTS,
-    MAX_PEOPLE, MAX_VIEWS, PairPose, PoseMessage, Skeletons, Stamp, Status, Timing, ViewPose,
+    MAX_PEOPLE, MAX_VIEWS, PairPose, PoseMessage, Sightings, Skeletons, Stamp, Status, Timing,
     ViewQuality,
 };
 use multiview::{Settings, ViewPlan};
@@ -222,7 +222,7 @@ fn frame(input: &[u8]) {
 }
 
 /// Returns valid candidates with changes.
-fn view_pose(input: &[u8]) -> ViewPose {
+fn sightings(input: &[u8]) -> Sightings {
     let mut message = wire::candidates_to_message(&[pose(), pose()], SIZE).expect("they fit");
     let extras = [Some(([3.0, 4.0], 1.0)), None, Some(([5.0, 6.0], 2.0)), None];
     wire::extras_to_message(&mut message, 2, &extras).expect("they fit");
@@ -249,7 +249,7 @@ fn view_pose(input: &[u8]) -> ViewPose {
 
 fn candidates(input: &[u8]) {
     let World { model, plans, .. } = world();
-    let message = view_pose(input);
+    let message = sightings(input);
     if let Ok(poses) = wire::candidates_from_message(&message, model, plans[0].layout()) {
         let centres = poses.iter().flat_map(|pose| pose.centres(model, plans[0].layout()));
         assert!(centres.flatten().all(f64::is_finite));
@@ -398,7 +398,7 @@ fn result(input: &[u8]) {
 pub fn wire_fusion(input: &[u8]) {
     let World { model, plans, fuse } = world();
     let (input, pairs) = input.split_at(input.len() / 2);
-    let message = view_pose(input);
+    let message = sightings(input);
     let Ok(candidates) = wire::candidates_from_message(&message, model, plans[0].layout()) else {
         return;
     };

@@ -21,13 +21,13 @@ pub enum Content {
     /// A frame as JPEG. The body is empty if there is no picture.
     Frame,
     /// Poses of a view, as in a recording. If maps are sent, [`Maps`](crate::hosts::Maps) follow.
-    ViewPose,
+    Sightings,
     /// Expected errors of a view, as in a recording.
     ViewQuality,
 }
 
 impl Content {
-    const ALL: [Self; 3] = [Self::Frame, Self::ViewPose, Self::ViewQuality];
+    const ALL: [Self; 3] = [Self::Frame, Self::Sightings, Self::ViewQuality];
 
     fn of_code(code: u16) -> Option<Self> {
         Self::ALL.get(usize::from(code).checked_sub(1)?).copied()
@@ -36,7 +36,7 @@ impl Content {
     fn code(self) -> u16 {
         match self {
             Self::Frame => 1,
-            Self::ViewPose => 2,
+            Self::Sightings => 2,
             Self::ViewQuality => 3,
         }
     }

@@ -117,7 +117,7 @@ impl Signal {
                 view: u32::try_from(second).map_err(|_large| error)?,
                 content: match whole[7] {
                     0 => Content::Frame,
-                    1 => Content::ViewPose,
+                    1 => Content::Sightings,
                     2 => Content::ViewQuality,
                     _ => return Err(error),
                 },
@@ -149,7 +149,7 @@ mod tests {
             Signal::Ack {
                 origin: 4,
                 view: 2,
-                content: Content::ViewPose,
+                content: Content::Sightings,
                 sequence: 11,
             },
         ]

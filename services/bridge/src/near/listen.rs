@@ -146,7 +146,7 @@ impl Gate {
         };
         let crosses = match packet.head.content {
             Content::Frame => self.carry == Carry::Frames,
-            Content::ViewPose | Content::ViewQuality => self.carry == Carry::Poses,
+            Content::Sightings | Content::ViewQuality => self.carry == Carry::Poses,
         };
         if !crosses {
             return remote
@@ -226,14 +226,14 @@ impl Decoder {
                 pixels?
             }
             Content::Frame => Vec::new(),
-            Content::ViewPose => {
+            Content::Sightings => {
                 let Some((poses, maps)) = maps::split(&it.body) else {
                     remote.malformed(&"the poses are truncated");
                     return None;
                 };
                 let maps = self.check(maps);
                 checked = maps.inspect_err(|error| remote.malformed(error)).ok()?;
-                self.message(Kind::ViewPose, poses)?
+                self.message(Kind::Sightings, poses)?
             }
             Content::ViewQuality => self.message(Kind::ViewQuality, it.body)?,
         };
@@ -271,7 +271,7 @@ impl Decoder {
 pub(super) fn kind_of(content: Content) -> Option<Kind> {
     match content {
         Content::Frame => None,
-        Content::ViewPose => Some(Kind::ViewPose),
+        Content::Sightings => Some(Kind::Sightings),
         Content::ViewQuality => Some(Kind::ViewQuality),
     }
 }

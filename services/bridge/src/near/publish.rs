@@ -82,7 +82,7 @@ impl Publisher {
                 let evidence = |_: &ViewMaps| bus.slice_publisher(&topic::evidence(view));
                 Port::Pose {
                     evidence: job.maps.get(view).map(evidence).transpose()?.map(Box::new),
-                    pose: Box::new(Sender::open(bus, Kind::ViewPose, &topic::view_pose(view))?),
+                    pose: Box::new(Sender::open(bus, Kind::Sightings, &topic::sightings(view))?),
                     quality: job.has_quality.then(quality).transpose()?.map(Box::new),
                 }
             }
@@ -169,7 +169,7 @@ impl Publisher {
                 if let (Some(evidence), Some(maps)) = (evidence, &arrived.maps) {
                     send_maps(evidence, maps, (stamp, timing))?;
                 }
-                let kind = kind_of(arrived.head.content).unwrap_or(Kind::ViewPose);
+                let kind = kind_of(arrived.head.content).unwrap_or(Kind::Sightings);
                 let message = Message::parse(kind, &arrived.body).or_fail(ExitKind::Run)?;
                 let envelope = Envelope {
                     stamp,
@@ -231,7 +231,7 @@ impl Publisher {
                         &envelope,
                     )
                 };
-                nothing(pose, Kind::ViewPose)?;
+                nothing(pose, Kind::Sightings)?;
                 if let Some(port) = quality.as_deref().filter(|_| status == Status::END) {
                     nothing(port, Kind::ViewQuality)?;
                 }

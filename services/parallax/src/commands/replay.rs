@@ -286,7 +286,7 @@ fn check_views(
     let wanted = [
         (needs.0, topic::frame as fn(usize) -> String, "frames"),
         (needs.1, topic::evidence, "evidence"),
-        (poses, topic::view_pose, "single-view poses"),
+        (poses, topic::sightings, "single-view poses"),
     ];
     for (is_needed, topic, what) in wanted {
         let names = lacks(topic);
@@ -312,7 +312,7 @@ fn needed(resolved: &Resolved, from: Stage) -> impl Iterator<Item = (Kind, &'sta
     let has_maps = resolved.deployment.has_maps();
     let all = [
         (Stage::Capture, Kind::Frame, "frames"),
-        (Stage::Pose, Kind::ViewPose, "single-view poses"),
+        (Stage::Pose, Kind::Sightings, "single-view poses"),
         (Stage::Quality, Kind::ViewQuality, "expected errors"),
         (
             Stage::Fuse,

@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn the_view_of_an_end_of_stream_is_taken_from_its_topic() {
         assert_eq!(view_in(&topic::frame(0)), 0);
-        assert_eq!(view_in(&topic::view_pose(13)), 13);
+        assert_eq!(view_in(&topic::sightings(13)), 13);
         assert_eq!(view_in(&topic::pair_pose(2)), 2);
         assert_eq!(view_in(&topic::skeletons()), 0);
     }

@@ -6,7 +6,7 @@ use crate::fuse::input::{Candidates, Input, expected_errors};
 use crate::fuse::job::Job;
 use crate::fuse::worker::Worker;
 use failure::Failure;
-use messages::{ViewPose, topic};
+use messages::{Sightings, topic};
 use pipeline::Following;
 use runtime::Service;
 use stage::Stage;
@@ -21,7 +21,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let mut stage = Stage::new(service, job.patience);
     stage.skip_when_behind(job.frame_step);
     for (view, plan) in job.plans.iter().enumerate() {
-        stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
+        stage.view_input(&topic::sightings(view), view, |pose: &Sightings| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
             Ok(Input::Candidates(Candidates {
                 front: wire::front_from_message(pose, candidates.len())?,

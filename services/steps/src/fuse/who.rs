@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use geometry::Camera;
-use messages::{Span, ViewPose, topic};
-use pipeline::{Sightings, WhoSettings, WhoStep, time_s};
+use messages::{Sightings, Span, topic};
+use pipeline::{ViewSightings, WhoSettings, WhoStep, time_s};
 use runtime::{Place, Service};
 use stage::{Frame, Stage};
 
@@ -37,7 +37,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     stage.skip_when_behind(job.frame_step);
     for view in 0..n_views {
         // Identities do not depend on extra keypoints.
-        stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
+        stage.view_input(&topic::sightings(view), view, |pose: &Sightings| {
             let n_extras = pose.n_keypoints as usize;
             wire::sightings_from_message(pose, n_extras)
         })?;
@@ -51,7 +51,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     let mut step = begin(service, job, settings, &mut place);
     let mut is_noted = true;
     stage.run(|frame| {
-        let answers: Vec<Option<Sightings>> = (0..n_views)
+        let answers: Vec<Option<ViewSightings>> = (0..n_views)
             .map(|view| answer(service, frame, view))
             .collect();
         let present = answers.iter().enumerate();
@@ -83,9 +83,9 @@ fn begin(service: &Service, job: &WhoJob, settings: WhoSettings, place: &mut Pla
 /// Returns the candidates of a view; `None` if it has none.
 fn answer(
     service: &Service,
-    frame: &mut Frame<'_, Option<Sightings>>,
+    frame: &mut Frame<'_, Option<ViewSightings>>,
     view: usize,
-) -> Option<Sightings> {
+) -> Option<ViewSightings> {
     let item = frame.take(view)?;
     let now = frame.turn().received_at();
     let waited = now.saturating_sub(item.timing.sent_at_nanos);

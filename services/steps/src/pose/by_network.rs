@@ -2,7 +2,7 @@
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos, processor_nanos};
 use kernels::Rgb8View;
-use messages::{Searched, Stamp, Status, ViewPose};
+use messages::{Searched, Sightings, Stamp, Status};
 use pipeline::{NetworkMemory, NetworkStep, Spent};
 use posenetwork::{MapGrid, PersonMaps};
 
@@ -71,7 +71,7 @@ impl View<'_> {
         }
         let message = wire::sightings_to_message(&people, self.job.n_extras, step.size());
         Ok(Ok(Found {
-            message: ViewPose {
+            message: Sightings {
                 searched: if memory.has_searched() {
                     Searched::FULL
                 } else {

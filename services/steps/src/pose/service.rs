@@ -19,7 +19,7 @@ pub fn run(service: &Service, job: &Job) -> Result<(), Failure> {
     let view = View {
         service,
         job,
-        poses: stage.view_output(&topic::view_pose(job.view), job.n_pose_consumers)?,
+        poses: stage.view_output(&topic::sightings(job.view), job.n_pose_consumers)?,
         evidence: stage.bulk_output(&topic::evidence(job.view), job.n_evidence_consumers)?,
     };
     let mut memory = match &job.step {

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{FrameTime, Layout, Scope, Tracker};
 use kernels::Rgb8View;
-use messages::{EvidenceHeader, FrameHeader, Searched, Status, Timing, ViewPose};
+use messages::{EvidenceHeader, FrameHeader, Searched, Sightings, Status, Timing};
 use pipeline::{ComputedOn, ViewEstimate, ViewStep};
 use runtime::metrics::Passage;
 use runtime::{Loan, Sample, Service, SlicePublisher};
@@ -18,7 +18,7 @@ use crate::pose::memory::Memory;
 /// Poses found in a frame, and the evidence if a process receives it.
 pub(crate) struct Found<'a> {
     /// The message, with a header without stamp and times.
-    pub(crate) message: ViewPose,
+    pub(crate) message: Sightings,
     pub(crate) header: EvidenceHeader,
     pub(crate) evidence: Option<Loan<'a, f32, EvidenceHeader>>,
     /// Time that the stage waited for the memory of the evidence, in nanoseconds.
@@ -37,7 +37,7 @@ struct Searching<'a> {
 pub(crate) struct View<'a> {
     pub(crate) service: &'a Service,
     pub(crate) job: &'a Job,
-    pub(crate) poses: Output<'a, ViewPose>,
+    pub(crate) poses: Output<'a, Sightings>,
     pub(crate) evidence: Rc<SlicePublisher<f32, EvidenceHeader>>,
 }
 
@@ -51,12 +51,12 @@ impl View<'_> {
         drop(sample);
         let message = match &outcome {
             Ok(found) => found.message,
-            Err(status) => ViewPose {
+            Err(status) => Sightings {
                 status: *status,
-                ..ViewPose::default()
+                ..Sightings::default()
             },
         };
-        let message = ViewPose {
+        let message = Sightings {
             skew_nanos,
             ..message
         };
@@ -199,7 +199,7 @@ impl<'a> Searching<'a> {
         };
         let (levels, bounds) = (&estimate.levels, &estimate.bounds);
         Ok(Found {
-            message: ViewPose {
+            message: Sightings {
                 searched: self.searched,
                 evidence_bytes: (n_values * size_of::<f32>()) as u64,
                 ..message

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use fmp::{Layout, LocalScore, Model, Pose};
 use kernels::Rgb8View;
-use messages::{FrameHeader, ViewPose, ViewQuality, topic};
+use messages::{FrameHeader, Sightings, ViewQuality, topic};
 use runtime::{Sample, Service};
 use stage::{Context, Stage};
 use viewquality::{ForecastInput, Forecaster, Predictor};
@@ -58,7 +58,7 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
     let view = job.view;
     let frame_scale = job.frame_scale;
     let mut stage = Stage::new(service, job.patience);
-    let poses = stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| Ok(*pose))?;
+    let poses = stage.view_input(&topic::sightings(view), view, |pose: &Sightings| Ok(*pose))?;
     let frames = match &job.source {
         Source::Table(_) => None,
         Source::Network(_) => Some(stage.hold_frames(view, job.frame_step)?),
@@ -76,7 +76,7 @@ pub fn run(service: &Service, job: &mut Job) -> Result<(), Failure> {
                 match candidates(network, &pose.value) {
                     Ok(candidates) => predict(network, candidates, picture, frame_scale)?,
                     Err(error) => {
-                        Context::of(service).count_refused("view-pose", &error);
+                        Context::of(service).count_refused("sightings", &error);
                         no_prediction()?
                     }
                 }
@@ -107,7 +107,7 @@ fn no_prediction() -> Result<ViewQuality, Failure> {
 /// The candidates of a view, and the scores of the first candidate's parts.
 type Candidates = (Vec<Pose>, Vec<LocalScore>);
 
-fn candidates(source: &NetworkSource, pose: &ViewPose) -> Result<Candidates, WireError> {
+fn candidates(source: &NetworkSource, pose: &Sightings) -> Result<Candidates, WireError> {
     let candidates = wire::candidates_from_message(pose, &source.model, &source.layout)?;
     let scores = wire::local_from_message(pose, source.model.n_parts())?;
     Ok((candidates, scores))

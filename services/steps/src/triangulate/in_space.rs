@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
-use messages::{EvidenceHeader, Skeletons, ViewPose, topic};
+use messages::{EvidenceHeader, Sightings, Skeletons, topic};
 use multiview::ViewPlan;
-use pipeline::{ExtrasStep, FramePeople, Motion, Sightings, SpaceStep};
+use pipeline::{ExtrasStep, FramePeople, Motion, SpaceStep, ViewSightings};
 use posenetwork::PersonMaps;
 use runtime::{Sample, Service};
 use stage::{Context, Frame, Held, Output, Stage};
@@ -36,7 +36,7 @@ pub struct SpaceJob {
 /// A decoded message.
 #[derive(Debug)]
 enum Input {
-    Seen(Option<Sightings>),
+    Seen(Option<ViewSightings>),
     People(FramePeople),
 }
 
@@ -52,7 +52,7 @@ pub fn run_in_space(service: &Service, job: &SpaceJob, mut step: SpaceStep) -> R
     stage.skip_when_behind(job.frame_step);
     let n_views = job.plans.len();
     for view in 0..n_views {
-        stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
+        stage.view_input(&topic::sightings(view), view, |pose: &Sightings| {
             wire::sightings_from_message(pose, job.extras.n_keypoints()).map(Input::Seen)
         })?;
     }
@@ -91,7 +91,8 @@ impl Solver<'_> {
         motions: &mut BTreeMap<u64, Motion>,
     ) -> Result<(), Failure> {
         let n_views = self.job.plans.len();
-        let answers: Vec<Option<Sightings>> = (0..n_views).map(|view| seen(frame, view)).collect();
+        let answers: Vec<Option<ViewSightings>> =
+            (0..n_views).map(|view| seen(frame, view)).collect();
         let people = match frame.take(self.people).map(|item| item.value) {
             Some(Input::People(people)) => people,
             _ => FramePeople::default(),
@@ -138,7 +139,7 @@ impl Solver<'_> {
     }
 }
 
-fn seen(frame: &mut Frame<'_, Input>, view: usize) -> Option<Sightings> {
+fn seen(frame: &mut Frame<'_, Input>, view: usize) -> Option<ViewSightings> {
     match frame.take(view)?.value {
         Input::Seen(seen) => seen,
         Input::People(_) => None,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use failure::{ExitKind, Failure, OrFail as _};
 use fmp::Pose;
-use messages::{PairPose, ViewPose, topic};
+use messages::{PairPose, Sightings, topic};
 use multiview::{FrontEvidence, ViewPlan};
 use pipeline::{PairResult, Skeleton, SkeletonStep, ViewResult, Views};
 use runtime::Service;
@@ -47,7 +47,7 @@ pub fn run(service: &Service, job: &Job, mut step: SkeletonStep) -> Result<(), F
     let n_views = job.plans.len();
     let mut stage = Stage::new(service, job.patience);
     for (view, plan) in job.plans.iter().enumerate() {
-        stage.view_input(&topic::view_pose(view), view, |pose: &ViewPose| {
+        stage.view_input(&topic::sightings(view), view, |pose: &Sightings| {
             let candidates = wire::candidates_from_message(pose, plan.model(), plan.layout())?;
             let front = wire::front_from_message(pose, candidates.len())?;
             Ok(Input::Candidates(Found {

@@ -58,7 +58,7 @@ impl Topology {
     /// Returns the topics that none of these processes publishes. With several hosts, these topics stay on the other hosts.
     pub fn topics_elsewhere(&self) -> Vec<String> {
         let of_views = (0..self.n_views).flat_map(|view| {
-            let small = [topic::view_pose(view), topic::view_quality(view)];
+            let small = [topic::sightings(view), topic::view_quality(view)];
             let large = [
                 topic::frame(view),
                 topic::evidence(view),
@@ -89,7 +89,7 @@ fn crossing(view: usize, deployment: &Deployment) -> Vec<String> {
         Carry::Frames => vec![topic::frame(view)],
         Carry::Poses => {
             let quality = deployment.has_quality();
-            let mut topics = vec![topic::view_pose(view)];
+            let mut topics = vec![topic::sightings(view)];
             topics.extend(quality.then(|| topic::view_quality(view)));
             topics.extend(deployment.maps_cross().then(|| topic::evidence(view)));
             topics
@@ -154,7 +154,7 @@ mod tests {
             ("", vec!["frame/v1/0", "frame/v1/2"]),
             (
                 "carry = 'poses'\n",
-                vec!["view-pose/v8/0", "view-pose/v8/2"],
+                vec!["sightings/v1/0", "sightings/v1/2"],
             ),
         ] {
             let it = deployment(more);
@@ -187,7 +187,7 @@ mod tests {
         let it = solved("space", "carry = 'poses'\n");
         let whole = Topology::new(&it, None, None);
         let [desk, far] = [0, 1].map(|host| whole.clone().on_host(&it, &it.hosts[host]));
-        let crosses = [0, 2].map(|view| [topic::view_pose(view), topic::evidence(view)]);
+        let crosses = [0, 2].map(|view| [topic::sightings(view), topic::evidence(view)]);
         assert_eq!(
             desk.process(BRIDGE).unwrap().outputs,
             crosses.as_flattened()

@@ -35,7 +35,7 @@ pub enum Content {
     /// Response maps of a view, with their header.
     Evidence,
     /// Pose candidates of a single view.
-    ViewPose,
+    Sightings,
     /// Expected errors of a view.
     ViewQuality,
     /// Results of one fusion worker.
@@ -119,8 +119,8 @@ impl Topology {
             rooms.push(self.evidence(view, size.evidence_values));
             // The receivers are quality, triangulate, fusion and the recorders.
             let receivers = 2 + self.n_workers + n_recorders;
-            let pose = topic::view_pose(view);
-            rooms.push(small(pose, Content::ViewPose, receivers));
+            let pose = topic::sightings(view);
+            rooms.push(small(pose, Content::Sightings, receivers));
             let quality = topic::view_quality(view);
             rooms.push(small(quality, Content::ViewQuality, receivers));
         }

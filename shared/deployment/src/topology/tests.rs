@@ -74,8 +74,8 @@ fn all_views_at_once_use_one_worker_for_any_allowed_number() {
         assert_eq!(recorded.receivers_of(&topic::pair_pose(0)), 3);
         assert_eq!(replayed.receivers_of(&topic::pair_pose(0)), 2);
         // A replayed pose process sends only to processes that run.
-        assert_eq!(recorded.receivers_of(&topic::view_pose(0)), 4);
-        assert_eq!(replayed.receivers_of(&topic::view_pose(0)), 2);
+        assert_eq!(recorded.receivers_of(&topic::sightings(0)), 4);
+        assert_eq!(replayed.receivers_of(&topic::sightings(0)), 2);
     }
 }
 
@@ -87,7 +87,7 @@ fn topics_of_a_recorded_deployment_have_the_expected_receivers() {
     let n = |topic: String| topology.receivers_of(&topic);
     assert_eq!(n(topic::frame(1)), 4, "pose, quality, results, record");
     assert_eq!(
-        n(topic::view_pose(1)),
+        n(topic::sightings(1)),
         6,
         "quality, fuse twice, triangulate, results, record"
     );
@@ -145,7 +145,7 @@ fn topics_have_the_expected_capacities() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 3, 1, 4, 391_680, None),
         ("evidence/v4/2", 2, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v8/2", 5, 4, 2, 1, None),
+        ("sightings/v1/2", 5, 4, 2, 1, None),
         ("view-quality/v2/2", 5, 4, 2, 1, None),
         ("pair-pose/v3/0", 2, 4, 2, 1, None),
         ("pair-pose/v3/1", 2, 4, 2, 1, None),
@@ -160,7 +160,7 @@ fn topics_have_the_expected_capacities() {
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 4, 1, 1, 391_680, None),
         ("evidence/v4/2", 3, 1, 1, 10_000_000, Some(2)),
-        ("view-pose/v8/2", 6, 16, 2, 1, None),
+        ("sightings/v1/2", 6, 16, 2, 1, None),
         ("view-quality/v2/2", 6, 16, 2, 1, None),
         ("pair-pose/v3/0", 3, 16, 2, 1, None),
         ("pair-pose/v3/1", 3, 16, 2, 1, None),

@@ -93,12 +93,12 @@ impl Scene {
 
     fn run(&self) -> Vec<Result<Triangulated, NoJoint>> {
         let seen = self.seen.iter().map(|people| {
-            Some(Sightings {
+            Some(ViewSightings {
                 people: people.clone(),
                 skew_s: 0.0,
             })
         });
-        let seen: Vec<Option<Sightings>> = seen.collect();
+        let seen: Vec<Option<ViewSightings>> = seen.collect();
         self.step.run(&self.skeleton, &seen, &mut Motion::default())
     }
 }

@@ -43,7 +43,7 @@ fn sighting(camera: &Camera, [x, y]: [f64; 2], heat: f32) -> Sighting {
 }
 
 /// Returns the views' sightings of people at given positions, in an order that differs from view to view.
-fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
+fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<ViewSightings>> {
     let view = |view: usize| {
         let camera = camera(view);
         let all = people.iter();
@@ -51,7 +51,7 @@ fn seen(people: &[([f64; 2], f32)]) -> Vec<Option<Sightings>> {
             all.map(|(place, heat)| sighting(&camera, *place, *heat)).collect();
         let n = all.len().max(1);
         all.rotate_left(view % n);
-        (!all.is_empty()).then_some(Sightings {
+        (!all.is_empty()).then_some(ViewSightings {
             people: all,
             skew_s: 0.0,
         })

@@ -2,8 +2,8 @@
 
 use bytemuck::{bytes_of, cast_slice};
 use messages::{
-    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Skeletons, Status,
-    ViewPose, ViewQuality,
+    EvidenceHeader, FrameHeader, Health, PairPose, People, PictureHeader, Sightings, Skeletons,
+    Status, ViewQuality,
 };
 use recording::{Envelope, Kind, encode, split_skeletons};
 use runtime::{Bus, PortError, ReceiveError, SliceSubscriber, Subscriber, Waiter};
@@ -41,7 +41,7 @@ pub struct Receiver {
 enum Port {
     Frame(SliceSubscriber<u8, FrameHeader>),
     Evidence(SliceSubscriber<f32, EvidenceHeader>),
-    ViewPose(Subscriber<ViewPose>),
+    Sightings(Subscriber<Sightings>),
     ViewQuality(Subscriber<ViewQuality>),
     PairPose(Subscriber<PairPose>),
     People(Subscriber<People>),
@@ -68,7 +68,7 @@ impl Receiver {
         let port = match kind {
             Kind::Frame => Port::Frame(bus.slice_subscriber(topic, waiter)?),
             Kind::Evidence => Port::Evidence(bus.slice_subscriber(topic, waiter)?),
-            Kind::ViewPose => Port::ViewPose(bus.subscriber(topic, waiter)?),
+            Kind::Sightings => Port::Sightings(bus.subscriber(topic, waiter)?),
             Kind::ViewQuality => Port::ViewQuality(bus.subscriber(topic, waiter)?),
             Kind::PairPose => Port::PairPose(bus.subscriber(topic, waiter)?),
             Kind::People => Port::People(bus.subscriber(topic, waiter)?),
@@ -107,7 +107,7 @@ impl Receiver {
             Port::Evidence(port) => port
                 .receive()?
                 .and_then(|sample| of(bytes_of(sample.header()), cast_slice(sample.payload()))),
-            Port::ViewPose(port) => port.receive()?.and_then(|pose| {
+            Port::Sightings(port) => port.receive()?.and_then(|pose| {
                 let received = of(bytes_of(&pose), &[])?;
                 Some(Received {
                     has_evidence: pose.evidence_bytes > 0,

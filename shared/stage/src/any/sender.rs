@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, cast_slice_mut, pod_read_unaligned};
 use messages::{
-    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Skeletons, Status, ViewPose,
+    EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Sightings, Skeletons, Status,
     ViewQuality,
 };
 use recording::{Envelope, Kind, Message};
@@ -24,7 +24,7 @@ pub struct Sender {
 enum Port {
     Frame(SlicePublisher<u8, FrameHeader>),
     Evidence(SlicePublisher<f32, EvidenceHeader>),
-    ViewPose(Publisher<ViewPose>),
+    Sightings(Publisher<Sightings>),
     ViewQuality(Publisher<ViewQuality>),
     PairPose(Publisher<PairPose>),
     People(Publisher<People>),
@@ -44,7 +44,7 @@ impl Sender {
         let port = match kind {
             Kind::Frame => Port::Frame(bus.slice_publisher(topic)?),
             Kind::Evidence => Port::Evidence(bus.slice_publisher(topic)?),
-            Kind::ViewPose => Port::ViewPose(bus.publisher(topic)?),
+            Kind::Sightings => Port::Sightings(bus.publisher(topic)?),
             Kind::ViewQuality => Port::ViewQuality(bus.publisher(topic)?),
             Kind::PairPose => Port::PairPose(bus.publisher(topic)?),
             Kind::People => Port::People(bus.publisher(topic)?),
@@ -69,7 +69,7 @@ impl Sender {
         match &self.port {
             Port::Frame(port) => Some(port),
             Port::Evidence(port) => Some(port),
-            Port::ViewPose(port) => Some(port),
+            Port::Sightings(port) => Some(port),
             Port::ViewQuality(port) => Some(port),
             Port::PairPose(port) => Some(port),
             Port::People(port) => Some(port),
@@ -91,7 +91,7 @@ impl Sender {
         match &self.port {
             Port::Frame(port) => array(port, &head, message.elements),
             Port::Evidence(port) => array(port, &head, message.elements),
-            Port::ViewPose(port) => plain(port, &head),
+            Port::Sightings(port) => plain(port, &head),
             Port::ViewQuality(port) => plain(port, &head),
             Port::PairPose(port) => plain(port, &head),
             Port::People(port) => plain(port, &head),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::marker::PhantomData;
 use std::rc::Rc;
 
-use messages::{PairPose, Refusal, Timing, ViewPose, ViewQuality};
+use messages::{PairPose, Refusal, Sightings, Timing, ViewQuality};
 use wire::WireError;
 
 use super::*;
@@ -126,7 +126,7 @@ fn inbox(inputs: Vec<Box<dyn Input<u64>>>, n_slots: usize, rules: Rules) -> Inbo
 }
 
 /// Returns the topics of two views, and a stage that joins them.
-fn two_views(rules: Rules) -> ([Topic<ViewPose>; 2], Inbox<'static, u64>) {
+fn two_views(rules: Rules) -> ([Topic<Sightings>; 2], Inbox<'static, u64>) {
     let topics = [Topic::new(), Topic::new()];
     let inputs = [0, 1].map(|view| input(&topics[view], Sender::View(view), Slots::one(view)));
     let inbox = inbox(inputs.into(), 2, rules);
@@ -175,9 +175,9 @@ fn a_frame_is_complete_at_its_deadline_and_a_later_message_is_counted_as_late() 
 fn a_connected_sender_has_more_time_with_lossless_delivery() {
     let connected = Topic {
         senders: vec![1],
-        ..Topic::<ViewPose>::new()
+        ..Topic::<Sightings>::new()
     };
-    let other = Topic::<ViewPose>::new();
+    let other = Topic::<Sightings>::new();
     let inputs = vec![
         input(&other, Sender::View(0), Slots::one(0)),
         input(&connected, Sender::View(1), Slots::one(1)),
@@ -194,7 +194,7 @@ fn a_connected_sender_has_more_time_with_lossless_delivery() {
 fn messages_of_other_senders_and_undecodable_messages_are_refused() {
     let ([first, _second], mut inbox) = two_views(rules(Delivery::Realtime));
     let counts = Counts::default();
-    let mut of_another_session: ViewPose = message(0, 0);
+    let mut of_another_session: Sightings = message(0, 0);
     of_another_session.stamp.session = 8;
     first.send(of_another_session);
     first.send(message(0, 1)); // another view's
@@ -209,8 +209,8 @@ fn the_inbox_is_finished_when_every_input_has_ended_and_every_frame_was_returned
     let ([first, second], mut inbox) = two_views(rules(Delivery::Lossless));
     let counts = Counts::default();
     first.send(message(0, 0));
-    first.send(ViewPose::end(stamp(1, 0)));
-    second.send(ViewPose::end(stamp(1, 1)));
+    first.send(Sightings::end(stamp(1, 0)));
+    second.send(Sightings::end(stamp(1, 1)));
     let clock = || 0;
     inbox.poll(&Context::new(SESSION, &clock, &counts)).unwrap();
     assert!(!inbox.is_over(0));
@@ -251,7 +251,7 @@ fn the_messages_and_the_end_of_a_worker_count_for_its_pairs() {
 }
 
 /// Returns a view's poses and its expected errors, which are optional, with a deadline of 30 ns and a maximum age of 25 ns.
-fn with_errors(delivery: Delivery) -> (Topic<ViewPose>, Topic<ViewQuality>, Inbox<'static, u64>) {
+fn with_errors(delivery: Delivery) -> (Topic<Sightings>, Topic<ViewQuality>, Inbox<'static, u64>) {
     let (poses, errors) = (Topic::new(), Topic::new());
     let inputs = vec![
         input(&poses, Sender::View(0), Slots::one(0)),

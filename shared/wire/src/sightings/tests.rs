@@ -57,7 +57,7 @@ proptest! {
         let back = sightings_from_message(&message, 3).unwrap();
         let is_somebody = !people.is_empty();
         prop_assert_eq!(message.status == Status::OK, is_somebody);
-        let sent = Sightings { people, skew_s: (skew * 1_000_000) as f64 * 1e-9 };
+        let sent = ViewSightings { people, skew_s: (skew * 1_000_000) as f64 * 1e-9 };
         prop_assert_eq!(back, is_somebody.then_some(sent));
     }
 
@@ -81,7 +81,7 @@ proptest! {
         small in 0_u32..10,
         which in 0_usize..8,
     ) {
-        let mut pose = ViewPose { status: Status::OK, ..ViewPose::default() };
+        let mut pose = Sightings { status: Status::OK, ..Sightings::default() };
         let mut header = EvidenceHeader::default();
         let number = |nth: usize| f32::from_bits(numbers[nth]);
         for n in [n, small] {

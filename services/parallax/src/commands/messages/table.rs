@@ -5,8 +5,8 @@ use core::mem::offset_of;
 use messages::{
     CameraCounts, EvidenceHeader, FrameHeader, FusedView, GridMessage, Health, Joint3d, Kept,
     LocalMessage, Metrics, MetricsRow, PairHypothesis, PairPose, People, PersonMessage,
-    PictureHeader, PoseMessage, Searched, Sides, SkeletonMessage, Skeletons, Span, Stamp, Status,
-    TimedBy, Timing, ViewPose, ViewQuality, topic,
+    PictureHeader, PoseMessage, Searched, Sides, Sightings, SkeletonMessage, Skeletons, Span,
+    Stamp, Status, TimedBy, Timing, ViewQuality, topic,
 };
 
 /// The type of a field.
@@ -160,7 +160,7 @@ structs! {
         connection name reserved;
     PoseMessage, "PoseMessage.v1": score level n_parts x y mixture;
     LocalMessage, "LocalMessage.v1": response contrast margin;
-    ViewPose, "ViewPose.v10":
+    Sightings, "Sightings.v1":
         stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates joints
         local front heats colours ages_s keypoints;
     GridMessage, "GridMessage.v1": first_px cell_px size;
@@ -202,7 +202,7 @@ pub(super) fn topics() -> Vec<Topic> {
     let all = [
         (topic::frame(ANY), "FrameHeader", number(u8::shape())),
         (topic::picture(ANY), "PictureHeader", number(u8::shape())),
-        (topic::view_pose(ANY), "ViewPose", None),
+        (topic::sightings(ANY), "Sightings", None),
         (topic::evidence(ANY), "EvidenceHeader", number(f32::shape())),
         (topic::view_quality(ANY), "ViewQuality", None),
         (topic::pair_pose(ANY), "PairPose", None),
