@@ -19,7 +19,7 @@ pub struct RemadeStream {
     /// Size of the kept pictures.
     size: Size,
     /// Size of the pictures that the decoder sends.
-    shown_size: Size,
+    sent_size: Size,
     child: StreamEnd,
     stdout: ChildStdout,
     log: Log,
@@ -70,7 +70,7 @@ impl RemadeStream {
         Ok(Self {
             name: name.to_owned(),
             size,
-            shown_size: small.unwrap_or(size),
+            sent_size: small.unwrap_or(size),
             child: StreamEnd(Arc::new(Mutex::new(child))),
             stdout,
             log: Log::follow(stderr).map_err(not_started)?,
@@ -89,9 +89,9 @@ impl RemadeStream {
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<Option<i64>, FootageError> {
         assert_eq!(
             rgb.len(),
-            self.shown_size.rgb_bytes(),
+            self.sent_size.rgb_bytes(),
             "a picture is {} in RGB",
-            self.shown_size
+            self.sent_size
         );
         let failed = |message: String| FootageError::Video {
             path: self.name.clone().into(),

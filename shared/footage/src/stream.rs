@@ -106,7 +106,7 @@ pub struct LiveStream {
     /// Size of the camera's pictures.
     size: Size,
     /// Size of the pictures that the decoder sends.
-    shown_size: Size,
+    sent_size: Size,
     has_times: bool,
     child: StreamEnd,
     stdout: ChildStdout,
@@ -255,7 +255,7 @@ impl StreamSpec {
             address: self.address.clone(),
             shown: self.shown(),
             size,
-            shown_size: small.unwrap_or(size),
+            sent_size: small.unwrap_or(size),
             has_times: self.has_times(),
             child: StreamEnd(Arc::new(Mutex::new(child))),
             stdout,
@@ -390,9 +390,9 @@ impl LiveStream {
     pub fn next_into(&mut self, rgb: &mut [u8]) -> Result<StreamFrame, FootageError> {
         assert_eq!(
             rgb.len(),
-            self.shown_size.rgb_bytes(),
+            self.sent_size.rgb_bytes(),
             "a frame is {} in RGB",
-            self.shown_size
+            self.sent_size
         );
         if let Err(error) = self.stdout.read_exact(rgb) {
             self.child.end();

@@ -69,7 +69,7 @@ impl Standard {
     ///
     /// # Panics
     ///
-    /// Panics if the lengths differ or are not multiples of 3.
+    /// Panics if the lengths differ.
     pub(super) fn to_rgb(self, planes: &[u8], rgb: &mut [u8]) {
         const BT601: Factors = Factors::new(0.299, 0.114);
         const BT709: Factors = Factors::new(0.2126, 0.0722);
