@@ -244,7 +244,11 @@ fn blend(pixel: &mut [u8], colour: Colour, cover: f64) {
     }
 }
 
-/// Returns the length of a vector. `f64::hypot` takes several times as long, and its last bits do not matter here.
+/// Returns the length of a vector.
+#[expect(
+    clippy::imprecise_flops,
+    reason = "`hypot` takes several times as long, and its last bits do not matter here"
+)]
 fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
