@@ -58,8 +58,11 @@ impl Writer {
         let missed = Arc::clone(&n_missed);
         let n_written = Arc::new(AtomicU64::new(0));
         let written = Arc::clone(&n_written);
-        let thread =
-            WriterThread::start(move || write_all(output, &batches, [&missed, &written], session))?;
+        let thread = WriterThread::start(move || {
+            // The pictures of a frame can wait; the next frame cannot.
+            runtime::give_way();
+            write_all(output, &batches, [&missed, &written], session);
+        })?;
         Ok(Self {
             queue,
             thread,
