@@ -182,12 +182,12 @@ fn has_capability(status: &str, capability: u32) -> bool {
     mask.is_some_and(|mask| mask >> capability & 1 == 1)
 }
 
-/// Nice value of an onlooker. It gives the onlooker two fifths of the processor time of an ordinary process. With less, the onlooker could
-/// not follow a run that uses all processors.
+/// Nice value of an onlooker, or of a thread whose work can wait. It gives two fifths of the processor time of an ordinary process. With
+/// less, an onlooker could not follow a run that uses all processors.
 const WAY: i32 = 4;
 
-/// Lowers the priority of this thread, and of the threads that it starts, so that other processes run first if processors are scarce. Call
-/// this before any thread is started; it cannot be undone.
+/// Lowers the priority of this thread, and of the threads that it starts from now on, so that other threads run first if processors are
+/// scarce. It cannot be undone. To lower a whole process, call this before any thread is started.
 pub fn give_way() {
     if let Err(error) = nice(WAY) {
         tracing::debug!(%error, "cannot give way to other processes");
