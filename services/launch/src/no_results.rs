@@ -32,7 +32,7 @@ pub fn reason(summary: &Summary, views: &[ViewReport]) -> Option<String> {
     }
     if views.len() > 1 {
         return Some(format!(
-            "views show a person, but none of {} results has a plausible joint in space: maybe there was nobody. \
+            "views show a person, but none of {} results has a plausible 3D joint: maybe there was nobody. \
              Otherwise run `calib check`, and check that the unit of the calibration is right (`unit`: m, mm, ft, or 30mm for squares of \
              the board), that all footage was recorded at the same time, and that people are large enough",
             summary.frames

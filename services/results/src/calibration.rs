@@ -102,7 +102,7 @@ impl Calibration {
                     camera = scene.views[view].name,
                     offset_ms = fit.offset_ms,
                     offset_error_ms = fit.offset_error_ms,
-                    "the camera is out of step: its pictures were taken at other times than they state"
+                    "the camera is not synchronised: its pictures were not taken at their stated times"
                 );
             }
             fit.out_of_step = is_named;

@@ -187,7 +187,7 @@ pub enum TrialError {
     #[error("there is no frame")]
     Empty,
     /// There is no point in any frame.
-    #[error("none of {frames} frames has a joint in space")]
+    #[error("none of {frames} frames has a 3D joint")]
     NoPoint {
         /// Number of lines.
         frames: usize,

@@ -29,7 +29,7 @@ pub enum FootageError {
     NoName,
     /// The name is not UTF-8, and the conversion changed it.
     #[error(
-        "no such footage: {path}; its name, or that of a folder above it, is not UTF-8 (the odd bytes are shown as \
+        "no such footage: {path}; its name, or that of a folder above it, is not UTF-8 (invalid bytes are shown as \
          \u{fffd}): rename it"
     )]
     NotUtf8 {

@@ -119,7 +119,10 @@ fn run(launch: Launch, body: impl FnOnce(&Service) -> Result<(), Failure>) -> Re
     raise_file_limit();
     // Called before other threads start, because they inherit the scheduling of this one.
     for denied in launch.scheduling.apply() {
-        tracing::warn!(hint = denied.hint(), "{denied}; going on without");
+        tracing::warn!(
+            hint = denied.hint(),
+            "{denied}; continuing without this setting"
+        );
     }
     let stop = launch
         .supervisor

@@ -300,8 +300,8 @@ fn numbers_that_are_not_finite_are_faults() {
     fs::write(dir.path().join("labels.mat"), bytes).unwrap();
     let people = read(dir.path(), &ReadOptions::default()).unwrap();
     let expected = [
-        "labels.mat, person 2: joint 2 is at (NaN, 9.5)",
-        "labels.mat, person 3: joint 3 is at (14, inf)",
+        "labels.mat, person 2: joint 2 is at (NaN, 9.5), expected two finite numbers",
+        "labels.mat, person 3: joint 3 is at (14, inf), expected two finite numbers",
         "labels.mat, person 4: joint 1 is unknown",
     ];
     assert_eq!(messages(&people), expected);

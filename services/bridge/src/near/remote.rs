@@ -103,7 +103,7 @@ impl Remote {
             let why = listed(why);
             tracing::warn!(
                 host = self.name,
-                "the host is not accepted; it differs as follows, from its own point of view: {why}"
+                "the host is not accepted, because its files or settings differ (in this list, \"this host\" is that host): {why}"
             );
         }
         state.refused = Some(why.to_vec());

@@ -69,7 +69,7 @@ pub(crate) struct Arguments {
     /// The people to leave out.
     #[arg(long, value_name = "SELECTION", value_parser = selection)]
     without: Option<Selection>,
-    /// Meaning of left and right: `marked` as in the data set; `seen` swaps them for people seen from behind.
+    /// Meaning of left and right. `marked`: as in the data set. `seen`: swapped for people seen from behind.
     #[arg(long, value_name = "SIDES", default_value = "marked")]
     sides: Sides,
     /// Map from parts to joints (a file of `train joints`); "shipped" for the map of the shipped model. With "none", or for other models, a

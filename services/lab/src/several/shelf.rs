@@ -55,7 +55,7 @@ pub enum ShelfError {
         reason: String,
     },
     /// A text file of numbers does not have the expected form.
-    #[error("{}: number {number} should be {expected}", path.display())]
+    #[error("{}: number {number} of the file is missing or wrong: expected {expected}", path.display())]
     Number {
         /// The file.
         path: PathBuf,
@@ -390,12 +390,12 @@ fn size(candidates: &[Candidates], group: &Group) -> f64 {
 fn truth(path: &Path) -> Result<Vec<Vec<TruePerson>>, ShelfError> {
     let text = read(path)?;
     let mut numbers = Numbers::new(path, &text);
-    let is_expected = numbers.next::<usize>("15 joints")? == N_TRUE;
+    let is_expected = numbers.next::<usize>("15, the number of joints")? == N_TRUE;
     if !is_expected {
         return Err(ShelfError::Number {
             path: path.to_owned(),
             number: 1,
-            expected: "15 joints",
+            expected: "15, the number of joints",
         });
     }
     let n_frames: usize = numbers.next("the number of frames")?;
@@ -456,7 +456,7 @@ mod tests {
         fs::write(&file, "15 2 1 0 0.5 0.5").unwrap();
         let error = truth(&file).unwrap_err().to_string();
         assert!(
-            error.ends_with("gt.txt: number 7 should be a number"),
+            error.ends_with("gt.txt: number 7 of the file is missing or wrong: expected a number"),
             "{error}"
         );
     }

@@ -39,7 +39,7 @@ pub(super) fn out_of_step(camera: &str, fit: &CameraFit) -> String {
     let [offset, error] = [fit.offset_ms, fit.offset_error_ms].map(|ms| ms.unwrap_or(f64::NAN));
     let how = if offset < 0.0 { "before" } else { "after" };
     format!(
-        "  clock         {camera} is out of step: according to the movement of people, its pictures were taken {:.0} ms {how} their \
+        "  clock         {camera} is not synchronised: according to the movement of people, its pictures were taken {:.0} ms {how} their \
          stated times (+-{error:.0} ms)\n",
         offset.abs(),
     )
@@ -216,7 +216,7 @@ mod tests {
             ..CameraFit::default()
         };
         let text = out_of_step("left", &fit);
-        assert!(text.contains("left is out of step"), "{text}");
+        assert!(text.contains("left is not synchronised"), "{text}");
         assert!(
             text.contains("21 ms before their stated times (+-1 ms)"),
             "{text}"

@@ -16,7 +16,7 @@ use trials::bench::{self, Kind, Report};
 /// The benchmark to run.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Measure one hop between two processes, without a deployment.
+    /// Measure the transfer of a message between two processes (one hop), without a deployment.
     Transport(transport::Arguments),
     /// Measure the latency of a deployment from picture to result, stage by stage, including after a camera has died.
     Latency(load::Arguments),

@@ -55,7 +55,7 @@ pub(crate) struct Arguments {
     /// Folder for the report and the run.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     out: PathBuf,
-    /// Frames per camera. If not given, as many as in twenty seconds, but at least 30.
+    /// Frames per camera. If not given, the number of frames in twenty seconds, but at least 30.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(10..=1_000_000))]
     frames: Option<u64>,
     /// Duration of the run in seconds, instead of --frames.

@@ -41,7 +41,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Folder with the results of a run.
     folder: PathBuf,
-    /// The method. `rts` looks ahead, and uses the measured covariances. `butterworth` is a zero-phase low-pass filter.
+    /// The method. `rts` uses later frames, and the measured covariances. `butterworth` is a zero-phase low-pass filter.
     /// `kalman` is the method of live runs. `none` only computes angles.
     #[arg(long, value_name = "METHOD", value_parser = method)]
     method: Option<Method>,

@@ -126,8 +126,8 @@ pub fn of_refinement(
     about_table(&mut out, about);
     put!(
         out,
-        "<p class=\"note\">{} instants. The distance of held-out joints from where the other cameras see them is {} px with the old \
-         rig, and {} px with the new rig; {} of {} blocks improved ({} standard errors of the mean).</p>\n",
+        "<p class=\"note\">{} instants. The distance of held-out joints from the positions that the other cameras predict is {} px with \
+         the old rig, and {} px with the new rig; {} of {} blocks improved ({} standard errors of the mean).</p>\n",
         outcome.n_instants,
         number(outcome.held_out_px[0], 2),
         number(outcome.held_out_px[1], 2),

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum C3dError {
     /// The file ends before data that is required or declared.
-    #[error("the file has {got} bytes, {what} would end at byte {needed}")]
+    #[error("the file has {got} bytes, but {what} would end at byte {needed}")]
     Short {
         /// Name of the item that is cut off.
         what: &'static str,
@@ -34,7 +34,7 @@ pub enum C3dError {
         what: &'static str,
     },
     /// The scale is zero or NaN.
-    #[error("the scale of the points is {value}")]
+    #[error("the scale of the points is {value}, expected a number other than 0")]
     Scale {
         /// Value of the scale.
         value: f64,

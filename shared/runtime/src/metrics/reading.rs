@@ -23,7 +23,7 @@ pub enum ReadingError {
         span: u32,
     },
     /// The index of a view is too large.
-    #[error("view {view} of at most {MAX_VIEWS}")]
+    #[error("the index of the view is {view}, but there are at most {MAX_VIEWS} views")]
     UnknownView {
         /// Index of the view.
         view: u32,
@@ -277,7 +277,7 @@ fn queue_of(message: &Metrics) -> Result<Option<[u32; 2]>, ReadingError> {
         [NO_QUEUE, NO_QUEUE] => Ok(None),
         both @ [now, longest] if now <= longest && longest != NO_QUEUE => Ok(Some(both)),
         _ => Err(ReadingError::Contradiction {
-            what: "the queue is longer than it ever was",
+            what: "the queue is longer than its stated maximum",
         }),
     }
 }

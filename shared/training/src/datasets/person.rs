@@ -86,7 +86,7 @@ pub enum Fault {
         joint: usize,
     },
     /// A coordinate is infinite, or one of the two is NaN.
-    #[error("joint {joint} is at ({}, {})", at[0], at[1])]
+    #[error("joint {joint} is at ({}, {}), expected two finite numbers", at[0], at[1])]
     NotFinite {
         /// Number of the joint, from 1.
         joint: usize,

@@ -21,7 +21,7 @@ map of the parts, fitted by least squares. Finally, alpha, the cap on distances 
 held-out subjects, for the largest area under the PCP3D curve.
 
 Use the file with the model that it was learned with: `consistency = \"person.consistency\"` in the [paper] section \
-of a deployment, or --consistency of `eval`. For its format, see `Learned` in `cargo doc -p consistency`.
+of a deployment, or --consistency of `eval`. For its format, see `learned::Learned` in `cargo doc -p multiview`.
 
 --json prints one object: the weights, all weights that were tried with their scores, tau, the score of the tables on held-out \
 people for each number of bins, and the error of the joints with and without the map.
@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
     /// File to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Held-out subjects, on which the weights are chosen, separated by commas. If not given, the last quarter of the subjects.
+    /// Held-out subjects, separated by commas. The weights are chosen on them. If not given, the last quarter of the subjects.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     hold_out: Vec<String>,
     /// Maximum number of instants of the held-out subjects on which weights are tried. The instants are evenly spaced.

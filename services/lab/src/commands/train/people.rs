@@ -22,7 +22,7 @@ pub(super) struct People {
     /// People of a data set to leave out, for example its test set.
     #[arg(long, value_name = "[DATASET=]SELECTION")]
     without: Vec<String>,
-    /// Meaning of left and right: `marked` as in the data set; `seen` swaps them for people seen from behind.
+    /// Meaning of left and right. `marked`: as in the data set. `seen`: swapped for people seen from behind.
     /// The default is `marked`.
     #[arg(long, value_name = "[DATASET=]SIDES")]
     sides: Vec<String>,

@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
     /// Find only the intrinsics, separately for each camera.
     #[arg(long)]
     intrinsics: bool,
-    /// Calibration with intrinsics to keep, in any format. Its cameras must have the same names.
+    /// Calibration (in any format) whose intrinsics are kept. Its cameras must have the same names.
     #[arg(long, value_name = "FILE")]
     known: Option<PathBuf>,
     /// The lens model.
@@ -77,7 +77,7 @@ pub(crate) struct Arguments {
     /// Maximum number of pictures per camera that are searched for the board.
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(1..))]
     most_pictures: u32,
-    /// Maximum number of frames to use. Frames that cover most of the pictures are preferred.
+    /// Maximum number of frames to use. They are chosen so that the boards cover as much of the pictures as possible.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(3..=2000))]
     most_frames: u32,
     /// Read the corners from a table with the columns of Caliscope, instead of searching the pictures.
@@ -89,8 +89,8 @@ pub(crate) struct Arguments {
     /// Treat all footage as mirrored.
     #[arg(long)]
     mirrored: bool,
-    /// Back of the board: `mirrored` or `blank`. If not given, it is determined from the pictures where possible. A mirrored back shows the
-    /// mirror image of the front, corner on corner, for cameras on both sides.
+    /// Back of the board: `mirrored` or `blank`. If not given, it is determined from the pictures where possible. A mirrored back, for
+    /// cameras on both sides, shows the mirror image of the front: each corner is exactly behind the same corner of the front.
     #[arg(long, value_enum, conflicts_with = "mirrored")]
     back: Option<BackName>,
     /// File for the calibration. With --print, file for the board (.pdf or .svg). If not given, both a PDF and an SVG file are written.

@@ -25,7 +25,7 @@ The rig of the deployment is assumed to be correct to within --sd-degrees and --
 that. Clock offsets are also estimated, within --sd-ms of those in the deployment.
 
 The new rig is judged with data that it was not fitted to. Each half of the recording judges the rig that was fitted to the other half, \
-by the distance of each camera's joints from where the other cameras see them.
+by the distance of each camera's joints from the positions that the other cameras predict.
 
 Exit codes: 0 better, and --out is written; 6 not better, keep the rig; 7 refused, with all reasons.
 
@@ -104,8 +104,8 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     refuse(&outcome.doubts, &names, HINT)?;
     if !outcome.is_better {
         let message = format!(
-            "the new rig is not better: the distance of held-out joints from where the other cameras see them is {:.2} px with the old \
-             rig, and {:.2} px with the new rig; keep the old rig",
+            "the new rig is not better: the distance of held-out joints from the positions that the other cameras predict is {:.2} px with \
+             the old rig, and {:.2} px with the new rig; keep the old rig",
             outcome.held_out_px[0], outcome.held_out_px[1]
         );
         return Err(Failure::new(ExitKind::Limit, message));
@@ -148,8 +148,8 @@ fn about(arguments: &Arguments, walk: &Walk) -> Vec<(String, String)> {
 
 fn table(outcome: &Outcome, names: &[&str]) -> Result<(), Failure> {
     output::line(format_args!(
-        "{} instants; the distance of held-out joints from where the other cameras see them is {:.2} px with the old rig, and {:.2} px \
-         with the new rig; {} of {} blocks improved ({:.1} standard errors)",
+        "{} instants; the distance of held-out joints from the positions that the other cameras predict is {:.2} px with the old rig, \
+         and {:.2} px with the new rig; {} of {} blocks improved ({:.1} standard errors)",
         outcome.n_instants,
         outcome.held_out_px[0],
         outcome.held_out_px[1],

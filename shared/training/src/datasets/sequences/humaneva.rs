@@ -172,7 +172,7 @@ fn cameras(folder: &Path, action: &str, sync: &Sync) -> Result<(Rig, Vec<View>),
         let video = folder.join("Image_Data").join(format!("{stem}.avi"));
         let source = if pictures.is_dir() { pictures } else { video };
         if !source.exists() {
-            let hint = "the film, or a folder of its pictures without the extension, is not there";
+            let hint = "expected this video, or a folder of its pictures with the same name but without .avi";
             return Err(SequenceError::NoFootage { path: source, hint });
         }
         let name = camera.to_owned();

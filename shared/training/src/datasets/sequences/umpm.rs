@@ -112,7 +112,7 @@ fn cameras(
         // A folder of pictures is accepted too.
         let source = if stem.is_dir() { stem } else { video };
         if !source.exists() {
-            let hint = "the video, or a folder of its pictures without the extension, is not there";
+            let hint = "expected this video, or a folder of its pictures with the same name but without .avi";
             return Err(SequenceError::NoFootage { path: source, hint });
         }
         Ok(View {

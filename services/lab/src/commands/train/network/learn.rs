@@ -39,7 +39,8 @@ pub(crate) struct Arguments {
     people: Vec<PathBuf>,
     #[command(flatten)]
     learning: Learning,
-    /// Network from this command, with which to start instead of random weights. Use it to train for more steps, or to add your own people.
+    /// Network that this command has written. The training starts from it instead of from random weights. Use it to train for more steps,
+    /// or to add your own people.
     #[arg(long, value_name = "NETWORK")]
     from: Option<PathBuf>,
 }

@@ -117,8 +117,8 @@ fn check(rig: &Rig, run: &Path, frames: &[u64], skeletons: &Skeletons) -> Result
         }
         Some(share) if share > MOST_OFF => {
             let message = format!(
-                "{}: the run does not belong to this rig: the distance of its joints from where the cameras saw them is {:.0} % of the \
-                 person's size (median; at most {:.0} % is allowed)",
+                "{}: the run does not belong to this rig: its joints, projected into the cameras, are {:.0} % of the person's size away \
+                 from the joints seen there (median; at most {:.0} % is allowed)",
                 run.display(),
                 100.0 * share,
                 100.0 * MOST_OFF

@@ -39,7 +39,7 @@ pub enum MotionError {
         source: TrcError,
     },
     /// The frame rate is out of range.
-    #[error("{}: {rate_hz} frames per second", .path.display())]
+    #[error("{}: the frame rate is {rate_hz} Hz, expected 1 to 100000 Hz", .path.display())]
     Rate {
         /// The file.
         path: PathBuf,
