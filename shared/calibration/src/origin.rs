@@ -57,7 +57,7 @@ pub enum OriginError {
         rms_px: f64,
     },
     /// The cameras are not valid in the new world.
-    #[error("the rig is not valid in the new world")]
+    #[error("the rig is not valid in the new world frame")]
     Rig(#[from] RigError),
 }
 

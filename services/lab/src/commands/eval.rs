@@ -306,7 +306,8 @@ fn outcome(done: &Done) -> Result<ExitCode, Failure> {
             )
         }
         n => {
-            let message = format!("{n} frames were left out: the footage ended before the truth");
+            let message =
+                format!("{n} frames were left out: the footage ended before the ground truth");
             Err(Failure::new(ExitKind::Degraded, message))
         }
     }

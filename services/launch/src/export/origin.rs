@@ -198,7 +198,7 @@ pub(super) fn camera(resolved: &Resolved, rig: &Rig, nth: usize) -> Result<ViewC
     };
     let camera = rig
         .camera(&entry.name)
-        .ok_or_else(|| refused(format!("{} does not have it", rig.source())))?;
+        .ok_or_else(|| refused(format!("{} has no camera of this name", rig.source())))?;
     let footage = resolved.footage.get(nth);
     let size = footage.map_or(camera.intrinsics.size, |footage| footage.size);
     let whole = OutSize::Scale(1.0);

@@ -46,7 +46,7 @@ pub enum MatError {
         expected: String,
     },
     /// An index is out of range.
-    #[error("the components name an entry that does not exist")]
+    #[error("an index in the components refers to an entry that does not exist")]
     Index(#[from] ModelError),
 }
 

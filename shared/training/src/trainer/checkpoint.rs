@@ -32,7 +32,7 @@ pub struct Checkpoint {
 pub enum CheckpointError {
     /// The checkpoint belongs to a different training run.
     #[error(
-        "the checkpoint belongs to another training: people, images without people or settings have changed"
+        "the checkpoint belongs to another training: the people, the images without people, or the settings have changed"
     )]
     Other,
     /// The checkpoint is damaged.

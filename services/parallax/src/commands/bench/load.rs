@@ -32,8 +32,8 @@ The results of each run are in the folder OUT/<run>.";
 pub(crate) struct Arguments {
     /// The deployment file. If not given, synthetic cameras are used.
     deployment: Option<PathBuf>,
-    /// Number of cameras to use, from the first in the deployment file. If not given, all cameras of the file are used, or 4 synthetic
-    /// cameras.
+    /// Number of cameras to use, beginning with the first in the deployment file. If not given, all cameras of the file are used, or 4
+    /// synthetic cameras.
     #[arg(long, value_name = "N", value_parser = views)]
     views: Option<usize>,
     /// Length of the footage of every run, in seconds.

@@ -164,11 +164,11 @@ fn errors_name_the_part() {
             |mat| *of_part(mat, 3, 2) = row(vec![1.0; 3]),
         ),
         (
-            "the components name an entry that does not exist: part 3 names spring 5, but the model has only 4",
+            "an index in the components refers to an entry that does not exist: part 3 names spring 5, but the model has only 4",
             |mat| *of_part(mat, 3, 2) = row(vec![1.0, 5.0]),
         ),
         (
-            "the components name an entry that does not exist: part 1 names bias 0, but the model has only 9",
+            "an index in the components refers to an entry that does not exist: part 1 names bias 0, but the model has only 9",
             |mat| *of_part(mat, 1, 0) = number(0.0),
         ),
         ("`model.components` is 1x2, expected 1x1", |mat| {

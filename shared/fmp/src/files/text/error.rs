@@ -101,6 +101,6 @@ pub enum TextError {
         got: String,
     },
     /// An index is out of range.
-    #[error("the components name an entry that does not exist")]
+    #[error("an index in the components refers to an entry that does not exist")]
     Index(#[from] ModelError),
 }

@@ -118,7 +118,7 @@ fn truth(
     options: &Options,
 ) -> Result<(f64, &'static JointSet, Vec<Frame>), SequenceError> {
     let set = JointSet::by_name(&truth.joints)
-        .ok_or_else(|| invalid(file, 0, format!("no joint set {:?}", truth.joints)))?;
+        .ok_or_else(|| invalid(file, 0, format!("unknown joint set {:?}", truth.joints)))?;
     if truth.markers.len() != set.joints.len() {
         let (got, expected) = (truth.markers.len(), set.joints.len());
         let what = format!("{got} markers, but {} has {expected} joints", set.name);

@@ -45,7 +45,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
         return Err(invalid(&path, 1, what));
     }
     if !header.joints.iter().eq(PARSE14.joints.iter().map(|joint| joint.name)) {
-        return Err(invalid(&path, 1, "joints other than the 14 of PARSE"));
+        return Err(invalid(&path, 1, "the joints are not the 14 of PARSE"));
     }
     let mut frames = Vec::new();
     for (index, line) in lines {
@@ -65,7 +65,7 @@ pub(crate) fn read(folder: &Path, options: &Options) -> Result<Sequence, Sequenc
     let rig = geometry::files::read(&folder.join("rig.toml"), &ReadOptions::default())?;
     let known = rig.cameras().iter().map(|camera| camera.name.as_str());
     if !header.cameras.iter().map(String::as_str).eq(known) {
-        return Err(invalid(&path, 1, "other cameras than `rig.toml`"));
+        return Err(invalid(&path, 1, "the cameras are not those of `rig.toml`"));
     }
     let view = |camera: &String| View {
         camera: camera.clone(),

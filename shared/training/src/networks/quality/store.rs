@@ -17,7 +17,9 @@ pub enum SamplesError {
     #[error(transparent)]
     Store(#[from] StoreError),
     /// A sample's sizes do not match the header, or its numbers are invalid.
-    #[error("sample {sample} ({file_says}) has other sizes, or values that are not finite")]
+    #[error(
+        "sample {sample} ({file_says}) does not have the sizes in the header, or has values that are not finite"
+    )]
     Sample {
         /// Number of the sample, from 1.
         sample: usize,

@@ -53,7 +53,7 @@ pub(crate) struct Arguments {
     /// Files of samples for training and validation.
     #[arg(long, value_name = "FILE", required_unless_present = "print_settings")]
     samples: Vec<PathBuf>,
-    /// Files of samples to test the network on, each file separately. They are not used for training.
+    /// Files of samples on which the network is tested, separately for each file. They are not used for training.
     #[arg(long, value_name = "FILE")]
     judge: Vec<PathBuf>,
     /// ONNX file to write.
