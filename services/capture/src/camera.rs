@@ -25,13 +25,32 @@ pub(crate) struct Shot {
     pub(crate) skew: i64,
 }
 
+/// Warps the pictures of a camera. If they are all the same, only the first one is warped.
+struct Warper {
+    warp: Warp,
+    is_still: bool,
+    /// The warped picture, if all are the same.
+    kept: Option<Vec<u8>>,
+}
+
+impl Warper {
+    fn apply(&mut self, rgb: &[u8], out: &mut [u8]) {
+        if let Some(kept) = &self.kept {
+            out.copy_from_slice(kept);
+            return;
+        }
+        self.warp.apply(rgb, out);
+        self.kept = self.is_still.then(|| out.to_vec());
+    }
+}
+
 /// One camera, with the topic of its frames.
 pub(crate) struct Camera<'a> {
     service: &'a Service,
     job: &'a Job,
     stage: Stage<'a, ()>,
     publisher: Rc<SlicePublisher<u8, FrameHeader>>,
-    warp: Warp,
+    warper: Warper,
     pacer: Pacer,
     place: Place,
     n_dropped: u64,
@@ -56,7 +75,9 @@ impl<'a> Camera<'a> {
             _ => Pacer::as_fast_as_possible(),
         };
         let FeedInfo { size, shrink, .. } = supply.info();
-        Self::new(service, job, (size, shrink), pacer)
+        let mut camera = Self::new(service, job, (size, shrink), pacer)?;
+        camera.warper.is_still = supply.is_still();
+        Ok(camera)
     }
 
     /// Opens a live camera, which sets its own pace.
@@ -99,7 +120,11 @@ impl<'a> Camera<'a> {
             job,
             stage,
             publisher,
-            warp,
+            warper: Warper {
+                warp,
+                is_still: false,
+                kept: None,
+            },
             pacer,
             place: Place::of(service.bus()),
             n_dropped: 0,
@@ -157,6 +182,8 @@ impl<'a> Camera<'a> {
         if trouble == self.trouble {
             return;
         }
+        // A source that is opened again may have another picture.
+        self.warper.kept = None;
         let view = self.job.view;
         if let Some(status) = trouble {
             tracing::warn!(
@@ -199,7 +226,7 @@ impl<'a> Camera<'a> {
             let [width, height] = self.job.framing.out_size();
             let mut loan = self.publisher.loan((width * height * 3) as usize)?;
             let begin = now_nanos();
-            self.warp.apply(rgb, loan.payload_mut());
+            self.warper.apply(rgb, loan.payload_mut());
             computing += now_nanos() - begin;
             *loan.header_mut() = FrameHeader {
                 width,

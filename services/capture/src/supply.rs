@@ -47,6 +47,7 @@ pub(crate) struct Supply {
     /// The picture that is repeated while the camera is frozen.
     held: Option<Vec<u8>>,
     guard: Guard,
+    is_still: bool,
     /// Reason why there is no picture, after a failure.
     cause: Status,
     n_failures: u32,
@@ -72,7 +73,8 @@ impl Supply {
         let feed = Retimed::open(spec, timeline)?;
         let info = feed.info();
         let rate_hz = info.frame_rate_hz.map(|rate_hz| rate_hz * spec.step as f64);
-        let frozen_after = if feed.is_still() { 0 } else { frozen_after };
+        let is_still = feed.is_still();
+        let frozen_after = if is_still { 0 } else { frozen_after };
         Ok(Self {
             spec: spec.clone(),
             timeline: timeline.copied(),
@@ -84,6 +86,7 @@ impl Supply {
             early: None,
             held: None,
             guard: Guard::new(frozen_after, rate_hz),
+            is_still,
             cause: Status::NO_FRAME,
             n_failures: 0,
             retry_at: 0,
@@ -94,6 +97,11 @@ impl Supply {
     /// Returns the properties of the pictures.
     pub(crate) fn info(&self) -> FeedInfo {
         self.info
+    }
+
+    /// Returns true if all pictures are the same by design.
+    pub(crate) fn is_still(&self) -> bool {
+        self.is_still
     }
 
     /// Returns the index in the footage of the next frame.
