@@ -57,11 +57,12 @@ fn thin(canvas: &Canvas) -> f64 {
 fn fused(record: &FrameRecord, view: usize) -> impl Iterator<Item = &FusedView> {
     let people = record.skeletons.listed().iter();
     let poses = people.filter_map(move |person| person.listed_views().get(view));
-    poses.filter(|fused| {
-        let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
-        let mut numbers = fused.centres_px[..n_parts].iter().flatten();
-        fused.status == Status::OK && numbers.all(|number| number.is_finite())
-    })
+    poses.filter(|fused| fused.status == Status::OK && is_finite(fused))
+}
+
+fn is_finite(fused: &FusedView) -> bool {
+    let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
+    fused.centres_px[..n_parts].iter().flatten().all(|number| number.is_finite())
 }
 
 fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
@@ -106,12 +107,13 @@ fn side_of(name: &str) -> Side {
     }
 }
 
-/// Draws the epipolar lines on which the part must be, according to every other view.
+/// Draws the epipolar lines on which the part of the followed person must be, according to every other view. The lines of all people would
+/// cover the picture.
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
     for other in (0..scene.views.len()).filter(|i| *i != view) {
-        let poses = fused(record, other).filter(|fused| part < fused.n_parts as usize);
-        for fused in poses {
+        let pose = record.fused(other).filter(|fused| part < fused.n_parts as usize);
+        if let Some(fused) = pose.filter(|fused| is_finite(fused)) {
             let point = Point2::from(fused.centres_px[part]);
             let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
             let curve: Vec<[f64; 2]> = curve.iter().map(|curve| [curve.x, curve.y]).collect();
