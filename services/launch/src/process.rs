@@ -4,8 +4,10 @@ mod cores;
 mod live;
 pub(crate) mod view_step;
 
+use core::num::NonZero;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::thread;
 use steps::{fuse, pose, quality, triangulate};
 
 use deployment::Stage;
@@ -132,10 +134,11 @@ pub fn run(service: &Service, name: Name, arguments: &ProcessArguments) -> Resul
     if let Some(frame) = arguments.spin_after.filter(|_| service.epoch() == 0) {
         service.health().spin_after(frame);
     }
-    let n_threads = if name == Name::Pose {
-        resolved.deployment.runtime.threads
-    } else {
-        1
+    let n_threads = match name {
+        Name::Pose => resolved.deployment.runtime.threads,
+        // One person for each thread.
+        Name::Triangulate => thread::available_parallelism().map_or(1, NonZero::get),
+        _ => 1,
     };
     pool(n_threads).build_global().or_fail(ExitKind::Run)?;
     match name {

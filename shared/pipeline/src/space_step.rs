@@ -5,6 +5,7 @@ use std::sync::Arc;
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
 use posenetwork::PersonMaps;
+use rayon::prelude::*;
 
 use crate::person_step::{FrameViews, PersonStep, Rig};
 use crate::sighting::ViewSightings;
@@ -72,7 +73,8 @@ impl SpaceStep {
         self.n_frames += 1;
     }
 
-    /// Solves for the people of a frame, each separately, in their order.
+    /// Solves for the people of a frame, each separately; returns them in their order. Several people run in parallel on the current rayon
+    /// pool; the result does not depend on the number of threads.
     ///
     /// * `answers`: sightings of each view; `evidence`: maps of the people of each view. A view without sightings or maps does not
     ///   contribute.
@@ -87,21 +89,34 @@ impl SpaceStep {
             evidence,
             people,
         };
-        let mut solved = Vec::with_capacity(people.people.len());
-        for (nth, person) in people.people.iter().enumerate() {
-            let instant_s = self.instant_s;
-            let step = self.remembered(person.id);
-            step.begin(instant_s);
-            solved.push(PersonSkeleton {
-                id: person.id,
-                skeleton: step.run(&frame, nth),
-            });
+        for person in &people.people {
+            self.remember(person.id);
         }
-        solved
+        let instant_s = self.instant_s;
+        let solve = |known: &mut Remembered| {
+            let nth = people.people.iter().position(|person| person.id == known.id)?;
+            known.step.begin(instant_s);
+            let skeleton = known.step.run(&frame, nth);
+            Some((
+                nth,
+                PersonSkeleton {
+                    id: known.id,
+                    skeleton,
+                },
+            ))
+        };
+        // A single person is solved on this thread, without waking another.
+        let mut solved: Vec<(usize, PersonSkeleton)> = if people.people.len() > 1 {
+            self.people.par_iter_mut().filter_map(solve).collect()
+        } else {
+            self.people.iter_mut().filter_map(solve).collect()
+        };
+        solved.sort_by_key(|(nth, _)| *nth);
+        solved.into_iter().map(|(_, person)| person).collect()
     }
 
-    /// Returns the step of a person; creates it for a new person.
-    fn remembered(&mut self, id: u64) -> &mut PersonStep {
+    /// Notes that a person is in the frame; creates the step of a new person.
+    fn remember(&mut self, id: u64) {
         let known = self.people.iter().position(|person| person.id == id);
         let index = known.unwrap_or_else(|| {
             if self.people.len() >= MOST_REMEMBERED {
@@ -117,8 +132,6 @@ impl SpaceStep {
             });
             self.people.len() - 1
         });
-        let person = &mut self.people[index];
-        person.last = self.n_frames;
-        &mut person.step
+        self.people[index].last = self.n_frames;
     }
 }
