@@ -36,6 +36,8 @@ mod step_watch;
 
 mod up;
 
+mod wide;
+
 pub mod files;
 
 #[cfg(test)]
@@ -55,3 +57,4 @@ pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };
 pub use up::{y_up_from_world, z_up_from_world};
+pub use wide::{Sightline, widest_apart};

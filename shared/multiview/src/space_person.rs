@@ -1,7 +1,7 @@
 //! Solves for a person in space without prior knowledge. Decides which views have left and right swapped, which views show something else,
 //! and how tall the person is.
 
-use geometry::Camera;
+use geometry::{Camera, Sightline};
 use nalgebra::Point3;
 
 use crate::front::{FrontEvidence, front_log_ratio_of};
@@ -32,50 +32,75 @@ pub struct SolvedPerson {
 ///    Their camera was moved, or they show another person.
 /// 5. A second solution is found on finer and finer grids, with bone lengths for the stature of the first solution.
 ///
+/// Of many views, steps 1 to 4 use only those that see the person best. Each other view is compared with their solution: its left and right
+/// are swapped if it then fits better, and it is left out if it contradicts the solution.
+///
 /// * Returns `None` if no joint is seen by at least two views.
 pub fn solve_person(views: &[SpaceView<'_>], settings: &SpaceSettings) -> Option<SolvedPerson> {
+    let first = first_views(views);
+    let found = solve_from(&first, views, settings);
+    if found.is_some() || first.len() == views.len() {
+        return found;
+    }
+    solve_from(&(0..views.len()).collect::<Vec<_>>(), views, settings)
+}
+
+/// Solves for a person; the first solution is found from the views of the given indices.
+fn solve_from(
+    first: &[usize],
+    views: &[SpaceView<'_>],
+    settings: &SpaceSettings,
+) -> Option<SolvedPerson> {
+    let shown: Vec<SpaceView<'_>> = first.iter().map(|view| views[*view]).collect();
     let mut solver = FirstSolver {
-        views,
-        crossings: Crossings::new(views),
+        views: &shown,
+        crossings: Crossings::new(&shown),
         lengths: lengths_of(None),
         settings,
     };
-    let given = views.iter().enumerate();
-    let given = given.map(|(view, shown)| Used {
-        view,
-        exchanged: shown.exchanged,
-    });
-    let mut used: Vec<Used> = given.collect();
-    let mut first = solver.solve(&used)?;
-    let fits = used
-        .iter()
-        .all(|view| shortfall(&solver.shown(*view), &first, MOST) <= settings.good_fit);
-    if settings.as_seen {
-        first = solver.as_seen(&mut used, first)?;
-    } else if !fits {
-        first = solver.with_one_exchanged(&mut used, first)?;
-    }
-    let mut changed = used.iter().any(|view| view.exchanged != [false; 2]);
-    changed |= solver.exchange(&mut used, &first);
-    while !fits && let Some(worst) = solver.contradicts(&used) {
-        used.remove(worst);
-        changed = true;
-    }
-    if changed {
-        first = solver.solve(&used)?;
-    }
-    let lengths = lengths_of(Some(&first.joints));
-    let shown: Vec<SpaceView<'_>> = used.iter().map(|view| solver.shown(*view)).collect();
-    let choices = solver.choices(&used);
-    let pose = solve_in_space(&shown, &choices, &lengths, settings)?;
-    let mut of_views = vec![None; views.len()];
+    let (used, pose) = solver.decide()?;
+    let mut choices = solver.choices(&used);
+    let coarse: Vec<SpaceView<'_>> = used.iter().map(|view| solver.shown(*view)).collect();
+    let mut exchanged = vec![None; views.len()];
     for view in used {
-        of_views[view.view] = Some(view.exchanged);
+        exchanged[first[view.view]] = Some(view.exchanged);
     }
+    for (nth, view) in views.iter().enumerate().filter(|(nth, _)| !first.contains(nth)) {
+        let view = SpaceView {
+            exchanged: better_sides(view, &pose, settings).unwrap_or(view.exchanged),
+            ..*view
+        };
+        if shortfall(&view, &pose, QUARTER) <= settings.most_misfit {
+            exchanged[nth] = Some(view.exchanged);
+        }
+    }
+    let used = views.iter().zip(&exchanged);
+    let used = used.filter_map(|(view, exchanged)| {
+        Some(SpaceView {
+            exchanged: (*exchanged)?,
+            ..*view
+        })
+    });
+    let used: Vec<SpaceView<'_>> = used.collect();
+    let needs_all = first.len() < views.len() && choices.complete(&used, settings.n_places);
+    let coarse = if needs_all { &used } else { &coarse };
+    let lengths = lengths_of(Some(&pose.joints));
     Some(SolvedPerson {
-        pose,
-        views: of_views,
+        pose: solve_in_space([&used, coarse], &choices, &lengths, settings)?,
+        views: exchanged,
     })
+}
+
+/// Maximum number of views from which the first solution is found. Its time grows with the cube of their number.
+const MOST_FIRST: usize = 6;
+
+/// Returns the views from which the first solution is found: those that see the person well, from directions that cross at wide angles.
+fn first_views(views: &[SpaceView<'_>]) -> Vec<usize> {
+    if views.len() <= MOST_FIRST {
+        return (0..views.len()).collect();
+    }
+    let lines: Vec<Sightline> = views.iter().map(SpaceView::sightline).collect();
+    geometry::widest_apart(&lines, MOST_FIRST)
 }
 
 /// Maximum number of views for which every combination is tried.
@@ -90,6 +115,35 @@ struct FirstSolver<'a> {
 }
 
 impl<'a> FirstSolver<'a> {
+    /// Returns the views that agree, with their left and right as in the solution, and the first solution.
+    fn decide(&mut self) -> Option<(Vec<Used>, SpacePose)> {
+        let given = self.views.iter().enumerate();
+        let given = given.map(|(view, shown)| Used {
+            view,
+            exchanged: shown.exchanged,
+        });
+        let mut used: Vec<Used> = given.collect();
+        let mut first = self.solve(&used)?;
+        let fits = used
+            .iter()
+            .all(|view| shortfall(&self.shown(*view), &first, MOST) <= self.settings.good_fit);
+        if self.settings.as_seen {
+            first = self.as_seen(&mut used, first)?;
+        } else if !fits {
+            first = self.with_one_exchanged(&mut used, first)?;
+        }
+        let mut changed = used.iter().any(|view| view.exchanged != [false; 2]);
+        changed |= self.exchange(&mut used, &first);
+        while !fits && let Some(worst) = self.contradicts(&used) {
+            used.remove(worst);
+            changed = true;
+        }
+        if changed {
+            first = self.solve(&used)?;
+        }
+        Some((used, first))
+    }
+
     fn choices(&mut self, used: &[Used]) -> Choices {
         self.crossings.choices(used, self.settings.n_places)
     }
@@ -209,31 +263,43 @@ impl<'a> FirstSolver<'a> {
     fn exchange(&self, used: &mut [Used], found: &SpacePose) -> bool {
         let mut any = false;
         for used in used {
-            let view = self.shown(*used);
-            for (limb, pairs) in LIMBS.iter().enumerate() {
-                let sum = |exchanged: bool| -> f64 {
-                    let pair = |[right, left]: &[usize; 2]| {
-                        let names = if exchanged {
-                            [left, right]
-                        } else {
-                            [right, left]
-                        };
-                        let at = |name: usize, joint: usize| {
-                            found.joints[joint].map_or(0.0, |place| view.at(name, &place))
-                        };
-                        at(*names[0], *right) + at(*names[1], *left)
-                    };
-                    pairs.iter().map(pair).sum()
-                };
-                let own = used.exchanged[limb];
-                if sum(!own) > sum(own) + self.settings.margin {
-                    used.exchanged[limb] = !own;
-                    any = true;
-                }
+            if let Some(exchanged) = better_sides(&self.shown(*used), found, self.settings) {
+                used.exchanged = exchanged;
+                any = true;
             }
         }
         any
     }
+}
+
+/// Returns the swaps of left and right with which a view fits a solution better; `None` if it fits best as it is.
+fn better_sides(
+    view: &SpaceView<'_>,
+    found: &SpacePose,
+    settings: &SpaceSettings,
+) -> Option<[bool; 2]> {
+    let mut best = view.exchanged;
+    for (limb, pairs) in LIMBS.iter().enumerate() {
+        let sum = |exchanged: bool| -> f64 {
+            let pair = |[right, left]: &[usize; 2]| {
+                let names = if exchanged {
+                    [left, right]
+                } else {
+                    [right, left]
+                };
+                let at = |name: usize, joint: usize| {
+                    found.joints[joint].map_or(0.0, |place| view.at(name, &place))
+                };
+                at(*names[0], *right) + at(*names[1], *left)
+            };
+            pairs.iter().map(pair).sum()
+        };
+        let own = view.exchanged[limb];
+        if sum(!own) > sum(own) + settings.margin {
+            best[limb] = !own;
+        }
+    }
+    (best != view.exchanged).then_some(best)
 }
 
 fn set_exchanged(used: &mut [Used], combination: usize) {

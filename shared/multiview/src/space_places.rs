@@ -15,6 +15,29 @@ pub(crate) struct Choices {
     pub(crate) scores: [Vec<f64>; N],
 }
 
+impl Choices {
+    /// Adds places for the joints that have none, from more views. Returns true if there were such joints.
+    ///
+    /// * `n`: maximum number of places of a joint.
+    pub(crate) fn complete(&mut self, views: &[SpaceView<'_>], n: usize) -> bool {
+        if self.places.iter().all(|places| !places.is_empty()) {
+            return false;
+        }
+        let mut crossings = Crossings::new(views);
+        let used = views.iter().enumerate().map(|(view, shown)| Used {
+            view,
+            exchanged: shown.exchanged,
+        });
+        let used: Vec<Used> = used.collect();
+        for joint in 0..N {
+            if self.places[joint].is_empty() {
+                crossings.choose(joint, &used, n, self);
+            }
+        }
+        true
+    }
+}
+
 /// A view that is used, and whether its left and right are swapped, for the arms and for the legs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Used {
@@ -63,18 +86,23 @@ impl<'a> Crossings<'a> {
             scores: core::array::from_fn(|_| Vec::new()),
         };
         for joint in 0..N {
-            let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
-            for (nth, first) in used.iter().enumerate() {
-                for second in &used[nth + 1..] {
-                    self.add(joint, [*first, *second], used, &mut found);
-                }
-            }
-            found.sort_by(|a, b| b.0.total_cmp(&a.0));
-            found.truncate(n);
-            choices.scores[joint] = found.iter().map(|(score, _)| *score).collect();
-            choices.places[joint] = found.into_iter().map(|(_, at)| at).collect();
+            self.choose(joint, used, n, &mut choices);
         }
         choices
+    }
+
+    /// Sets the places of one joint.
+    fn choose(&mut self, joint: usize, used: &[Used], n: usize, choices: &mut Choices) {
+        let mut found: Vec<(f64, Point3<f64>)> = Vec::new();
+        for (nth, first) in used.iter().enumerate() {
+            for second in &used[nth + 1..] {
+                self.add(joint, [*first, *second], used, &mut found);
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        found.truncate(n);
+        choices.scores[joint] = found.iter().map(|(score, _)| *score).collect();
+        choices.places[joint] = found.into_iter().map(|(_, at)| at).collect();
     }
 
     /// Adds the places that two views suggest for a joint, with the evidence of all used views.

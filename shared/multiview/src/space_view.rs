@@ -1,8 +1,8 @@
 //! The evidence of a view for joints at points in space.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
-use geometry::{Camera, Ray};
+use geometry::{Camera, Ray, Sightline};
 
 use crate::front::FrontEvidence;
 
@@ -33,6 +33,12 @@ pub(crate) fn name(joint: usize, exchanged: [bool; 2]) -> usize {
 pub trait JointEvidence {
     /// Returns how well a joint fits at a point of the picture, in pixels.
     fn at(&self, joint: usize, point: [f64; 2]) -> f32;
+    /// Adds how well a joint fits at each of several points of the picture to their scores.
+    fn add_at(&self, joint: usize, points: &[[f64; 2]], scores: &mut [f64]) {
+        for (score, point) in scores.iter_mut().zip(points) {
+            *score += f64::from(self.at(joint, *point));
+        }
+    }
     /// Returns the possible positions of a joint, in pixels of the picture, the best first, each with its evidence.
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)];
     /// Returns the evidence for a joint that the view does not show: the floor.
@@ -52,11 +58,6 @@ pub struct SpaceView<'a> {
     pub front: FrontEvidence,
 }
 
-/// Returns the evidence of all views for a joint at a place.
-pub(crate) fn unary(views: &[SpaceView<'_>], joint: usize, at: &Point3<f64>) -> f64 {
-    views.iter().map(|view| view.at(view.named(joint), at)).sum()
-}
-
 impl SpaceView<'_> {
     /// Returns the evidence for a joint of the body at a place, after swapping left and right where the view has them swapped.
     pub fn evidence_at(&self, joint: usize, at: &Point3<f64>) -> f32 {
@@ -69,6 +70,23 @@ impl SpaceView<'_> {
     pub(crate) fn rays(&self, named: usize) -> Vec<Ray> {
         let maxima = self.evidence.maxima(named).iter();
         maxima.filter_map(|(at, _)| self.camera.ray(&(*at).into())).collect()
+    }
+
+    /// Returns the mean direction of the best positions of the joints, weighted by how clear they are.
+    pub(crate) fn sightline(&self) -> Sightline {
+        let floor = self.evidence.floor();
+        let (mut sum, mut weight) = (Vector3::zeros(), 0.0);
+        for (at, evidence) in (0..N).filter_map(|joint| self.evidence.maxima(joint).first()) {
+            if let Some(ray) = self.camera.ray(&(*at).into()) {
+                let clear = f64::from(evidence - floor).max(0.0);
+                sum += ray.direction.into_inner() * clear;
+                weight += clear;
+            }
+        }
+        Sightline {
+            direction: sum.try_normalize(0.0).unwrap_or_default(),
+            weight,
+        }
     }
 
     /// Returns the view's name of a joint.

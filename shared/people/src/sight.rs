@@ -1,6 +1,6 @@
 //! One joint as seen by a view: a ray, and how far the joint may be from it.
 
-use geometry::Camera;
+use geometry::{Camera, Sightline};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
 use crate::{Detection, Keypoint, N};
@@ -127,19 +127,30 @@ pub(crate) struct Met {
 
 /// Rays farther from the joint than this many standard deviations are ignored.
 const OUTLYING: f64 = 3.0;
+/// Maximum number of rays whose pairs propose a position. Each position is compared with all rays, so without this limit, the time would
+/// grow with the cube of the number of views.
+const MOST_PROPOSING: usize = 6;
 
 /// Triangulates the joint on which most of the rays agree, each weighted by its deviation and heat.
 ///
-/// Each pair of rays proposes a position. The position with the most support from the other rays is chosen, and then moved to minimise the
-/// squared distances to the rays that agree with it.
+/// Each pair of rays proposes a position; of many rays, only the pairs of those that cross at the widest angles. The position with the most
+/// support from all rays is chosen, and then moved to minimise the squared distances to the rays that agree with it.
 ///
 /// * `sights`: one for each view.
 /// * Returns `None` if no two rays agree.
 pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     let mut best: Option<(f64, Point3<f64>)> = None;
-    for (nth, a) in sights.iter().enumerate() {
-        for b in &sights[nth + 1..] {
-            let Some(it) = passing(a, b) else { continue };
+    let lines = sights.iter().map(|sight| Sightline {
+        direction: sight.direction,
+        weight: sight.heat,
+    });
+    let lines: Vec<Sightline> = lines.collect();
+    let proposing = geometry::widest_apart(&lines, MOST_PROPOSING);
+    for (nth, a) in proposing.iter().enumerate() {
+        for b in &proposing[nth + 1..] {
+            let Some(it) = passing(&sights[*a], &sights[*b]) else {
+                continue;
+            };
             let support = |sight: &Sight| sight.heat * agreement(sight.deviations(&it.point));
             let score: f64 = sights.iter().map(support).sum();
             if best.is_none_or(|best| score > best.0) {

@@ -282,6 +282,42 @@ fn a_rotated_camera_is_left_out_if_three_others_agree() {
     }
 }
 
+/// Of many views, only a few give the first solution; all give the last one.
+#[test]
+fn many_views_are_solved_with_a_swapped_one_a_rotated_one_and_a_joint_that_two_of_them_see() {
+    let cameras: Vec<Camera> = (0..14).map(|nth| camera(7.0 + 26.0 * f64::from(nth))).collect();
+    for (swapped, rotated) in [(0, 1), (5, 9), (12, 3)] {
+        let mut bumps: Vec<Bumps> = cameras.iter().map(Bumps::new).collect();
+        for [right, left] in LIMBS.into_iter().flatten() {
+            bumps[swapped].at.swap(right, left);
+            bumps[swapped].maxima.swap(right, left);
+        }
+        let mut calibrated = cameras.clone();
+        let turn = UnitQuaternion::from_euler_angles(0.0, 3.0_f64.to_radians(), 0.0);
+        calibrated[rotated].camera_from_world = turn * cameras[rotated].camera_from_world;
+        // Two neighbours see the wrist.
+        for nth in (0..14).filter(|nth| !(7..9).contains(nth)) {
+            bumps[nth].at[6] = None;
+            bumps[nth].maxima[6].clear();
+        }
+        let shown = calibrated.iter().zip(&bumps).map(|(camera, evidence)| SpaceView {
+            camera,
+            evidence,
+            exchanged: [false; 2],
+            front: [0.0; 2],
+        });
+        let shown: Vec<SpaceView<'_>> = shown.collect();
+        let found = solve_person(&shown, &SpaceSettings::default()).unwrap();
+        assert!(found.pose.joints[6].is_some(), "{swapped} {rotated}");
+        let error = worst(&found.pose);
+        assert!(error < 0.03, "{swapped} {rotated}: {error}");
+        for (nth, exchanged) in found.views.iter().enumerate() {
+            let expected = (nth != rotated).then_some([nth == swapped; 2]);
+            assert_eq!(*exchanged, expected, "{swapped} {rotated}: view {nth}");
+        }
+    }
+}
+
 #[test]
 fn bone_lengths_follow_the_stature_estimated_from_the_joints() {
     let of_anybody = lengths_of(None);
