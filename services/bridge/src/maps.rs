@@ -84,6 +84,7 @@ impl ViewMaps {
                 first_px: person.first_px,
                 cell_px: person.cell_px,
                 size: person.size,
+                ..GridMessage::default()
             };
         }
         let grids = wire::grids_from_message(&header)?;

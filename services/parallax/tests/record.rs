@@ -48,7 +48,7 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     for topic in [
         "frame/v1/0",
         "sightings/v1/1",
-        "evidence/v4/2",
+        "evidence/v5/2",
         "skeletons/v1",
     ] {
         let n = recording["topics"][topic]["messages"].as_u64().unwrap();
@@ -107,7 +107,7 @@ fn omitted_messages_and_existing_files_are_reported() {
     let case = Case::new("less", &[3; 2], PLAIN);
     let report = recorded(&case, &["--without", "pixels", "--without", "evidence"]);
     let topics = &report["recording"]["topics"];
-    assert_eq!(topics.get("evidence/v4/0"), None);
+    assert_eq!(topics.get("evidence/v5/0"), None);
     assert!(report["recording"]["bytes"].as_u64().unwrap() < 1_000_000);
     for (from, lacks) in [("pose", "the pixels of the frames"), ("fuse", "evidence")] {
         let ended = replayed(&case, &["--from", from]);

@@ -7,7 +7,7 @@ use crate::{MAX_CANDIDATES, MAX_LEVELS, Stamp, Status, Timing};
 
 /// Grid of the cells of one person's maps in the picture: `posenetwork::MapGrid`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, ZeroCopySend, Pod, Zeroable)]
-#[type_name("GridMessage.v1")]
+#[type_name("GridMessage.v2")]
 #[repr(C)]
 pub struct GridMessage {
     /// Centre of the first cell, in pixels of the frame.
@@ -16,14 +16,19 @@ pub struct GridMessage {
     pub cell_px: [f64; 2],
     /// Number of columns and rows.
     pub size: [u32; 2],
+    /// Form of the values: 0 for a value per cell, 1 for the peak of each joint.
+    pub kind: u32,
+    /// Explicit padding.
+    pub padding: u32,
 }
 
 /// The user header of a sample of `[f32]`, without gaps.
 ///
 /// With the network method, the sample has the maps of one person after the other, in the order of the candidates: `[joint][row][column]`.
+/// For keypoints of another program, it has the peak of each joint: `[joint][column, row, evidence, sigma]`, in cells.
 /// With the paper's method, it has the responses of an `fmp::Scope`. The header's alignment places the values at the start of a cache line.
 #[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend, Pod, Zeroable)]
-#[type_name("EvidenceHeader.v4")]
+#[type_name("EvidenceHeader.v5")]
 #[repr(C)]
 #[repr(align(64))]
 pub struct EvidenceHeader {

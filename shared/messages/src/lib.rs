@@ -58,7 +58,7 @@ const _: () = {
     assert!(size_of::<Timing>() == 16);
     assert!(size_of::<FrameHeader>() == 128);
     assert!(size_of::<PictureHeader>() == 192);
-    assert!(size_of::<EvidenceHeader>() == 1408);
+    assert!(size_of::<EvidenceHeader>() == 1472);
     assert!(size_of::<PoseMessage>() == 168);
     assert!(size_of::<LocalMessage>() == 12);
     assert!(

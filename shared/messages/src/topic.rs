@@ -25,7 +25,7 @@ pub fn sightings(view: usize) -> String {
 /// Returns the topic for the response maps of a view: `[f32]` with [`EvidenceHeader`](crate::EvidenceHeader).
 #[must_use]
 pub fn evidence(view: usize) -> String {
-    format!("evidence/v4/{view}")
+    format!("evidence/v5/{view}")
 }
 
 /// Returns the topic for the expected errors of a view: [`ViewQuality`](crate::ViewQuality).

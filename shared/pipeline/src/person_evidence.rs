@@ -60,14 +60,23 @@ fn is_within([left, top, right, bottom]: [f64; 4], [x, y]: [f64; 2]) -> bool {
 }
 
 impl JointEvidence for PersonEvidence<'_> {
-    fn at(&self, joint: usize, mut point: [f64; 2]) -> f32 {
-        if let Some(by) = self.since_instant.get(joint) {
-            point = [point[0] + by.x, point[1] + by.y];
+    fn at(&self, joint: usize, point: [f64; 2]) -> f32 {
+        let mut score = [0.0];
+        self.add_at(joint, &[point], &mut score);
+        score[0] as f32
+    }
+
+    fn add_at(&self, joint: usize, points: &[[f64; 2]], scores: &mut [f64]) {
+        let by = self.since_instant.get(joint).copied().unwrap_or_default();
+        let map = self.maps.map(joint);
+        for (score, point) in scores.iter_mut().zip(points) {
+            let point = [point[0] + by.x, point[1] + by.y];
+            *score += f64::from(if is_within(self.near, point) {
+                map.at(point)
+            } else {
+                self.maps.floor()
+            });
         }
-        if !is_within(self.near, point) {
-            return self.maps.floor();
-        }
-        self.maps.at(joint, point)
     }
 
     fn maxima(&self, joint: usize) -> &[([f64; 2], f32)] {

@@ -4,7 +4,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::MapSettings;
 use crate::maps::N_JOINTS;
-use crate::person_maps::PersonMaps;
+use crate::person_maps::{Peak, PersonMaps};
 
 /// Minimum residual heat to which another Gaussian is fitted; lower residuals are ignored.
 const LEAST_HEAT: f64 = 0.03;
@@ -90,6 +90,12 @@ fn precisions() -> [f64; 2] {
 /// Describes the maps of all joints as sums of Gaussians. The highest Gaussian is fitted first, and each further Gaussian is fitted to the
 /// residual of the earlier ones.
 pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
+    if let Some(peaks) = maps.peaks() {
+        return peaks
+            .enumerate()
+            .filter_map(|(joint, peak)| of_peak(joint, &peak, settings))
+            .collect();
+    }
     let size = maps.grid().size;
     let floor = settings.floor();
     let mut found = Vec::new();
@@ -103,7 +109,7 @@ pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
                 0.0
             }
         };
-        heats.extend(maps.map(joint).iter().map(heat));
+        heats.extend(maps.cells(joint).iter().map(heat));
         let first = found.len();
         while found.len() < first + MOST_OF_A_JOINT
             && let Some(bump) = highest(joint, &heats, size)
@@ -114,6 +120,18 @@ pub fn bumps(maps: &PersonMaps<'_>, settings: &MapSettings) -> Vec<Bump> {
         }
     }
     found
+}
+
+fn of_peak(joint: usize, peak: &Peak, settings: &MapSettings) -> Option<Bump> {
+    let [low, high] = precisions();
+    let precision = f64::from(peak.sigma).powi(-2).clamp(low, high) as f32;
+    let bump = Bump {
+        joint,
+        at: peak.cell,
+        heat: settings.heat(peak.evidence) as f32,
+        precision: [precision, 0.0, precision],
+    };
+    bump.is_sound().then_some(bump)
 }
 
 /// Fills maps from Gaussians. Cells that no Gaussian reaches are set to the floor.

@@ -26,4 +26,4 @@ pub use expected::expected_error;
 pub use maps::{JointMaps, MOST_CELLS, MapSettings};
 pub use network::{FitError, LookError, PoseNetwork, Sight, Turn, Workspace};
 pub use outline::{outline_of, overlap};
-pub use person_maps::{MapGrid, PersonMaps};
+pub use person_maps::{JointMap, MapGrid, MapKind, Peak, PersonMaps};

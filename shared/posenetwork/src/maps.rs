@@ -8,16 +8,17 @@ use skeleton::PARSE14;
 use crate::expected::expected_error;
 use crate::found::{likelihood, score_of, scored, weighted};
 use crate::network::{LookError, Read, Sight};
-use crate::person_maps::{MapGrid, PersonMaps};
+use crate::person_maps::{MapGrid, MapKind, Peak, PersonMaps};
 
 /// Number of joints; each has a map.
 pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 
-/// Conversion of a map to evidence: `lambda * ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
+/// Heat below which [`MapSettings::of_heat`] counts it as zero.
+pub(crate) const LEAST_HEAT: f64 = 1e-5;
+
+/// Conversion of a map to evidence: `ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapSettings {
-    /// Factor of the logarithm.
-    pub lambda: f64,
     /// Heat assumed where the network sees nothing. Because of this floor, one view cannot rule out a joint that other views see.
     pub eps: f64,
     /// Standard deviation of the position of a keypoint without a map, as a share of the height of the input.
@@ -27,34 +28,33 @@ pub struct MapSettings {
 impl MapSettings {
     /// The evidence where the network sees nothing.
     pub fn floor(&self) -> f32 {
-        (self.lambda * self.eps.ln()) as f32
+        self.eps.ln() as f32
     }
 
     /// The score of a person whose joints all have this heat and whose bones have their usual lengths.
     pub fn score_of_heat(&self, heat: f64) -> f32 {
-        (N_JOINTS as f64 * self.lambda * (heat + self.eps).ln()) as f32
+        (N_JOINTS as f64 * (heat + self.eps).ln()) as f32
     }
 
     /// The heat, 0 to 1, that corresponds to a value of evidence.
     pub fn heat(&self, evidence: f32) -> f64 {
-        ((f64::from(evidence) / self.lambda).exp() - self.eps).clamp(0.0, 1.0)
+        (f64::from(evidence).exp() - self.eps).clamp(0.0, 1.0)
     }
 
-    /// The evidence for a heat. A heat below a hundred-thousandth counts as zero, which saves the logarithm for most cells.
+    /// The evidence for a heat. A heat below [`LEAST_HEAT`] counts as zero, which saves the logarithm for most cells.
     ///
     /// * `floor`: [`Self::floor`].
     pub(crate) fn of_heat(&self, heat: f64, floor: f32) -> f32 {
-        if heat < 1e-5 {
+        if heat < LEAST_HEAT {
             return floor;
         }
-        (self.lambda * (heat + self.eps).ln()) as f32
+        (heat + self.eps).ln() as f32
     }
 }
 
 impl Default for MapSettings {
     fn default() -> Self {
         Self {
-            lambda: 1.0,
             eps: 0.02,
             point_sigma: 0.02,
         }
@@ -64,8 +64,9 @@ impl Default for MapSettings {
 /// Maps of the joints in a window of a picture, on the grid of the network's own maps.
 #[derive(Debug, Clone, Default)]
 pub struct JointMaps {
-    /// `[joint][row][column]`, weighted logarithms.
+    /// Weighted logarithms by cell, or peaks.
     values: Vec<f32>,
+    kind: MapKind,
     rows: usize,
     columns: usize,
     /// Interval between the kept rows and columns of the network's own maps.
@@ -84,6 +85,8 @@ pub struct JointMaps {
     errors: Vec<f64>,
     /// Standard deviation of a keypoint with score 1 on the maps themselves; `None` if it is computed from the heat.
     sigma_px: Option<f64>,
+    /// Working memory: a Gaussian along the columns.
+    across: Vec<f64>,
 }
 
 /// Maximum number of cells of a map. Larger maps are kept at lower resolution.
@@ -102,7 +105,7 @@ const GRID_PX: f64 = 2.0;
 const BOX_MARGIN: f64 = 1.25;
 /// Maximum number of rows of a grid for keypoints without maps.
 const MOST_ROWS: usize = 64;
-/// Minimum standard deviation on a grid for keypoints without maps, in cells. A narrower Gaussian could fall between two cells.
+/// Minimum standard deviation of a keypoint without a map, in cells: at least one pixel.
 const LEAST_SIGMA: f64 = 1.0;
 
 /// The standard deviation along one axis of a normal distribution in the plane whose mean distance is 1: sqrt(2 / pi).
@@ -122,6 +125,7 @@ impl JointMaps {
         let window = sight.maps_window()?;
         self.window = Some(window);
         self.floor = settings.floor();
+        self.kind = MapKind::Cells;
         (self.rows, self.columns, self.step) = if let Read::Maps(maps) = &read {
             let [rows, columns] = maps.size();
             let udp = matches!(
@@ -171,8 +175,8 @@ impl JointMaps {
         Ok(())
     }
 
-    /// Makes maps from the keypoints of a person found by another program. Each joint becomes a Gaussian as high as its score, above
-    /// the floor. If no person was found, all cells are at the floor and no joint has a peak.
+    /// Makes maps from the keypoints of a person found by another program ([`MapKind::Peaks`]). Each joint becomes a Gaussian as high as
+    /// its score, above the floor. If no person was found, no joint has a peak.
     ///
     /// * `keypoints`: positions in pixels of the picture; `None`, or a score of 0, for keypoints that were not found.
     /// * `ways`: for each joint, the alternative sums of keypoints from which it can be computed ([`joint_ways`](keypoints::joint_ways) of
@@ -193,15 +197,13 @@ impl JointMaps {
         sigma: f64,
     ) -> bool {
         self.floor = settings.floor();
+        self.kind = MapKind::Peaks;
         self.step = [1.0; 2];
         self.window = keypoints::outline(keypoints)
             .and_then(|outline| Window::grid(outline, BOX_MARGIN, MOST_ROWS));
         [self.columns, self.rows] = self.window.map_or([0, 0], |window| window.input());
-        let n_values = N_JOINTS * self.rows * self.columns;
         self.values.clear();
-        // Reserves memory for the largest grid, so that no later frame allocates.
-        self.values.reserve(N_JOINTS * MOST_ROWS * (4 * MOST_ROWS + 1));
-        self.values.resize(n_values, self.floor);
+        self.values.extend([[0.0, 0.0, self.floor, 1.0]; N_JOINTS].as_flattened());
         self.peaks.clear();
         self.peaks.resize(N_JOINTS, None);
         self.told.clear();
@@ -215,7 +217,8 @@ impl JointMaps {
         let height = bottom - top;
         self.sigma_px = Some(sigma * height);
         self.told.resize(N_JOINTS, None);
-        for (joint, ways) in ways.iter().enumerate().take(N_JOINTS) {
+        let values = self.values.as_chunks_mut::<{ Peak::LENGTH }>().0;
+        for ((joint, ways), value) in ways.iter().enumerate().zip(values) {
             let found = |at: usize| keypoints[at].filter(|keypoint| keypoint.score > 0.0);
             let seen = |way: &Way| Some((weighted(&way.row, found)?, way.spread));
             let Some((peak, spread)) = ways.iter().find_map(seen) else {
@@ -227,13 +230,15 @@ impl JointMaps {
                 self.told[joint] = Some(error / ALONG_AN_AXIS);
             }
             let sigma = (sigma.hypot(spread) * self.rows as f64).max(LEAST_SIGMA);
-            let at = window.in_input(peak.at);
-            self.fill_bump(joint, (at, peak.score), sigma, settings);
+            let [column, row] = window.in_input(peak.at).map(|side| side as f32);
+            let evidence = settings.of_heat(peak.score.clamp(0.0, 1.0), self.floor);
+            *value = [column, row, evidence, sigma as f32];
         }
         true
     }
 
-    /// Fills the map of one joint with a Gaussian.
+    /// Fills the map of one joint with a Gaussian; its cells must be at the floor. The Gaussian is the product of one along each axis, so
+    /// that every row and column needs only one exponential function.
     ///
     /// * `at`, `sigma`: in pixels of the input.
     fn fill_bump(
@@ -245,12 +250,21 @@ impl JointMaps {
     ) {
         let (area, columns, step) = (self.rows * self.columns, self.columns, self.step);
         let floor = self.floor;
+        let along = |axis: usize, cell: usize| {
+            let distance = (cell as f64 * step[axis] - at[axis]) / sigma;
+            (-0.5 * distance * distance).exp()
+        };
+        self.across.clear();
+        self.across.extend((0..columns).map(|column| along(0, column)));
         let cells = &mut self.values[joint * area..(joint + 1) * area];
-        for (cell, value) in cells.iter_mut().enumerate() {
-            let x = (cell % columns) as f64 * step[0] - at[0];
-            let y = (cell / columns) as f64 * step[1] - at[1];
-            let gauss = (-(x * x + y * y) / (2.0 * sigma * sigma)).exp();
-            *value = settings.of_heat(score.clamp(0.0, 1.0) * gauss, floor);
+        for (row, line) in cells.chunks_exact_mut(columns.max(1)).enumerate() {
+            let most = score.clamp(0.0, 1.0) * along(1, row);
+            if most < LEAST_HEAT {
+                continue;
+            }
+            for (value, across) in line.iter_mut().zip(&self.across) {
+                *value = settings.of_heat(most * across, floor);
+            }
         }
     }
 
@@ -380,6 +394,7 @@ impl JointMaps {
             first_px: [x0, y0],
             cell_px: [x1 - x0, y1 - y0],
             size: [self.columns, self.rows],
+            kind: self.kind,
         };
         Some(PersonMaps::new(grid, &self.values, self.floor))
     }

@@ -194,7 +194,7 @@ mod tests {
         assert!(*needed_bytes > 4 * 7 * 40_000_000, "{needed_bytes}");
         assert_eq!(*free_bytes, 64 << 20);
         assert!(error.to_string().contains("67 MB are free"), "{error}");
-        assert!(error.to_string().contains("evidence/v4/"), "{error}");
+        assert!(error.to_string().contains("evidence/v5/"), "{error}");
         assert!(error.hint().unwrap().contains("--shm-size"), "{error}");
     }
 

@@ -2,7 +2,7 @@
 
 use messages::{EvidenceHeader, GridMessage, MAX_CANDIDATES, NO_COLOUR, Sightings, Status};
 use pipeline::{ExtraKeypoint, Sighting, ViewSightings};
-use posenetwork::{MapGrid, MapSettings, PersonMaps};
+use posenetwork::{MapGrid, MapKind, MapSettings, PersonMaps};
 
 use crate::error::{count, equal, finite};
 use crate::{
@@ -155,6 +155,11 @@ pub fn maps_to_message(
             first_px: grid.first_px,
             cell_px: grid.cell_px,
             size: grid.size.map(|side| side as u32),
+            kind: match grid.kind {
+                MapKind::Cells => 0,
+                MapKind::Peaks => 1,
+            },
+            padding: 0,
         };
     }
     Ok(message)
@@ -179,7 +184,9 @@ pub fn maps_from_message<'a>(
     for grid in grids {
         let (own, others) = left.split_at(grid.n_values());
         left = others;
-        maps.push(PersonMaps::new(grid, own, floor));
+        let own = PersonMaps::new(grid, own, floor);
+        check_peaks(&own)?;
+        maps.push(own);
     }
     Ok(maps)
 }
@@ -203,7 +210,13 @@ pub fn grids_from_message(message: &EvidenceHeader) -> Result<Vec<MapGrid>, Wire
         {
             return Err(refused("grid.cell_px", nth, step, "pixels above 0"));
         }
+        let kind = match grid.kind {
+            0 => MapKind::Cells,
+            1 => MapKind::Peaks,
+            other => return Err(refused("grid.kind", nth, f64::from(other), "0 or 1")),
+        };
         Ok(MapGrid {
+            kind,
             first_px: grid.first_px,
             cell_px: grid.cell_px,
             size: grid.size.map(|side| side as usize),
@@ -232,6 +245,21 @@ fn check_maps(values: &[f32]) -> Result<(), WireError> {
         f64::from(values[entry]),
         "a finite number",
     ))
+}
+
+/// Checks the numbers of the peaks of a person's joints.
+fn check_peaks(maps: &PersonMaps<'_>) -> Result<(), WireError> {
+    for (joint, peak) in maps.peaks().into_iter().flatten().enumerate() {
+        if peak.sigma <= 0.0 {
+            return Err(refused(
+                "peak.sigma",
+                joint,
+                f64::from(peak.sigma),
+                "cells above 0",
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn is_place(px: f64) -> bool {

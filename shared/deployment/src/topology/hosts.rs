@@ -179,7 +179,7 @@ mod tests {
         let far = Topology::new(&it, None, None).on_host(&it, &it.hosts[1]);
         let expected = ["bridge", "pose-0", "pose-2", "capture-0", "capture-2"];
         assert_eq!(names(&far), expected);
-        assert_eq!(far.receivers_of("evidence/v4/0"), 0);
+        assert_eq!(far.receivers_of("evidence/v5/0"), 0);
     }
 
     #[test]

@@ -144,7 +144,7 @@ fn topics_have_the_expected_capacities() {
     assert_eq!(rooms.len(), 4 * 3 + 2 + 1);
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 3, 1, 4, 391_680, None),
-        ("evidence/v4/2", 2, 1, 1, 10_000_000, Some(2)),
+        ("evidence/v5/2", 2, 1, 1, 10_000_000, Some(2)),
         ("sightings/v1/2", 5, 4, 2, 1, None),
         ("view-quality/v2/2", 5, 4, 2, 1, None),
         ("pair-pose/v3/0", 2, 4, 2, 1, None),
@@ -159,7 +159,7 @@ fn topics_have_the_expected_capacities() {
     let rooms = topology.rooms(Mode::Lossless, &[SIZE; 3], 1);
     let of_last_view_and_later: [Numbers<'_>; 7] = [
         ("frame/v1/2", 4, 1, 1, 391_680, None),
-        ("evidence/v4/2", 3, 1, 1, 10_000_000, Some(2)),
+        ("evidence/v5/2", 3, 1, 1, 10_000_000, Some(2)),
         ("sightings/v1/2", 6, 16, 2, 1, None),
         ("view-quality/v2/2", 6, 16, 2, 1, None),
         ("pair-pose/v3/0", 3, 16, 2, 1, None),

@@ -74,10 +74,7 @@ pub fn sheet(picture: &Picture, sight: &Sight<'_>) -> Result<Canvas, LookError> 
         let Some(peak) = peak else {
             continue;
         };
-        let heat = places.iter().map(|place| {
-            let value = f64::from(maps.at(joint, *place)) / settings.lambda;
-            (value.exp() - settings.eps).max(0.0)
-        });
+        let heat = places.iter().map(|place| settings.heat(maps.at(joint, *place)));
         let heat: Vec<f64> = heat.collect();
         let mut tile = Canvas::from_rgb(size, heated(&plain, &heat).as_flattened());
         tile.ring(in_tile(peak.at), 5.0, 1.5, footage::CENTRE);

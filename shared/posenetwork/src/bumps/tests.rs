@@ -1,10 +1,9 @@
 //! Tests of the description of maps by Gaussians.
 
 use super::*;
-use crate::person_maps::MapGrid;
+use crate::person_maps::{MapGrid, MapKind};
 
 const SETTINGS: MapSettings = MapSettings {
-    lambda: 1.0,
     eps: 0.02,
     point_sigma: 0.0,
 };
@@ -12,12 +11,57 @@ const SETTINGS: MapSettings = MapSettings {
 const SIZE: [usize; 2] = [80, 90];
 
 fn maps(values: &[f32]) -> PersonMaps<'_> {
-    let grid = MapGrid {
+    PersonMaps::new(grid(MapKind::Cells), values, SETTINGS.floor())
+}
+
+fn grid(kind: MapKind) -> MapGrid {
+    MapGrid {
+        kind,
         first_px: [20.0, 30.0],
         cell_px: [2.0; 2],
         size: SIZE,
+    }
+}
+
+#[test]
+fn peaks_of_keypoints_become_the_same_gaussians_and_nearly_the_same_maps() {
+    let floor = SETTINGS.floor();
+    let mut values = [[0.0, 0.0, floor, 1.0]; N_JOINTS];
+    values[3] = [40.5, 30.25, SETTINGS.of_heat(0.8, floor), 2.5];
+    let peaks = PersonMaps::new(grid(MapKind::Peaks), values.as_flattened(), floor);
+    let sent = bumps(&peaks, &SETTINGS);
+    assert_eq!(sent.len(), 1);
+    let Bump {
+        joint,
+        at,
+        heat,
+        precision,
+    } = sent[0];
+    assert_eq!((joint, at), (3, [40.5, 30.25]));
+    assert!((heat - 0.8).abs() < 1e-6, "{heat}");
+    assert_eq!(precision, [0.16, 0.0, 0.16]);
+    let received = filled(&sent);
+    let cells = maps(&received);
+    // One to three standard deviations, beyond the floor, and outside the maps.
+    for (across, most) in [
+        (0.0, 0.01),
+        (5.0, 0.05),
+        (10.0, 0.3),
+        (15.0, 0.7),
+        (40.0, 1e-6),
+        (900.0, 0.0),
+    ] {
+        let point = [20.0 + 81.0 + across, 30.0 + 60.5];
+        let off = (peaks.at(3, point) - cells.at(3, point)).abs();
+        assert!(off <= most, "{across}: {off}");
+    }
+    let found = peaks.maxima(3, 3, |_| true);
+    let [(at, evidence)] = found[..] else {
+        panic!("one maximum, not {found:?}");
     };
-    PersonMaps::new(grid, values, SETTINGS.floor())
+    assert_eq!(at, [101.0, 90.5]);
+    assert!((evidence - 0.82_f32.ln()).abs() < 1e-6, "{evidence}");
+    assert_eq!(peaks.maxima(4, 3, |_| true), []);
 }
 
 fn filled(bumps: &[Bump]) -> Vec<f32> {

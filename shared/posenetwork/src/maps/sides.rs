@@ -1,15 +1,15 @@
 //! Left and right of the maps: swapping them, or assigning them from a single view.
 
-use super::JointMaps;
+use super::{JointMaps, N_JOINTS};
 use crate::network::PoseNetwork;
 
 impl JointMaps {
     /// Swaps the left and right joints as named by the network; [`Self::keypoint`] does not change.
     pub fn exchange_sides(&mut self) {
-        let area = self.rows * self.columns;
+        let length = self.values.len() / N_JOINTS;
         for [right, left] in skeleton::SIDES {
-            for cell in 0..area {
-                self.values.swap(right * area + cell, left * area + cell);
+            for value in 0..length {
+                self.values.swap(right * length + value, left * length + value);
             }
             self.peaks.swap(right, left);
             if !self.told.is_empty() {

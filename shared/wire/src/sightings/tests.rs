@@ -40,8 +40,10 @@ fn person() -> impl Strategy<Value = Sighting> {
 fn grid() -> impl Strategy<Value = MapGrid> {
     let side = || 1..9_usize;
     let px = || -500.0..3000.0;
-    ([px(), px()], [0.1..30.0, 0.1..30.0], [side(), side()]).prop_map(
-        |(first_px, cell_px, size)| MapGrid {
+    let kind = prop::sample::select(vec![MapKind::Cells, MapKind::Peaks]);
+    ([px(), px()], [0.1..30.0, 0.1..30.0], [side(), side()], kind).prop_map(
+        |(first_px, cell_px, size, kind)| MapGrid {
+            kind,
             first_px,
             cell_px,
             size,
@@ -64,7 +66,7 @@ proptest! {
     #[test]
     fn maps_survive_a_round_trip(grids in prop::collection::vec(grid(), 0..=8)) {
         let message = maps_to_message(&grids, [640, 480]).unwrap();
-        let values: Vec<f32> = (0..n_values(&grids)).map(|nth| nth as f32).collect();
+        let values: Vec<f32> = (0..n_values(&grids)).map(|nth| 1.0 / (nth + 1) as f32).collect();
         let maps = maps_from_message(&message, &values).unwrap();
         let back: Vec<MapGrid> = maps.iter().map(|map| *map.grid()).collect();
         prop_assert_eq!(back, grids);
@@ -94,6 +96,8 @@ proptest! {
                 first_px: [f64::from(number(4)), f64::from(number(5))],
                 cell_px: [f64::from(number(6)), f64::from(number(7))],
                 size: [numbers[8], numbers[9] % 70_000],
+                kind: numbers[11] % 3,
+                padding: 0,
             };
             drop(maps_from_message(&header, &[number(10)]));
         }
@@ -134,10 +138,26 @@ fn impossible_numbers_of_a_view_are_refused() {
         sightings_from_message(&message, 0).unwrap_err();
     }
     let grid = MapGrid {
+        kind: MapKind::Cells,
         first_px: [0.0; 2],
         cell_px: [2.0; 2],
         size: [3, 2],
     };
+    let of_peaks = MapGrid {
+        kind: MapKind::Peaks,
+        ..grid
+    };
+    let message = maps_to_message(&[of_peaks], [64, 48]).unwrap();
+    let values = [3.0, 4.0, 0.5, 1.0].repeat(14);
+    maps_from_message(&message, &values).unwrap();
+    for (nth, wrong) in [(3, 0.0), (3, -1.0), (2, f32::NAN), (0, f32::INFINITY)] {
+        let mut values = values.clone();
+        values[4 * 5 + nth] = wrong;
+        maps_from_message(&message, &values).unwrap_err();
+    }
+    let mut message = message;
+    message.people[0].kind = 2;
+    maps_from_message(&message, &values).unwrap_err();
     let sent = maps_to_message(&[grid], [64, 48]).unwrap();
     let mut values = vec![-1.0; grid.n_values()];
     maps_from_message(&sent, &values).unwrap();

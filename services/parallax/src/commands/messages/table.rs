@@ -163,8 +163,8 @@ structs! {
     Sightings, "Sightings.v1":
         stamp timing status n_candidates width height evidence_bytes skew_nanos searched n_keypoints candidates joints
         local front heats colours ages_s keypoints;
-    GridMessage, "GridMessage.v1": first_px cell_px size;
-    EvidenceHeader, "EvidenceHeader.v4":
+    GridMessage, "GridMessage.v2": first_px cell_px size kind padding;
+    EvidenceHeader, "EvidenceHeader.v5":
         stamp timing width height status n_levels n_people padding people x y scope_levels levels best size reserved;
     ViewQuality, "ViewQuality.v2":
         stamp timing status n_parts sigma_px n_thresholds network tau_px tile took_nanos;
