@@ -32,7 +32,7 @@ pub struct SolvedPerson {
 ///    Their camera was moved, or they show another person.
 /// 5. A second solution is found on finer and finer grids, with bone lengths for the stature of the first solution.
 ///
-/// Of many views, steps 1 to 4 use only those that see the person best. Each other view is compared with their solution: its left and right
+/// With many views, steps 1 to 4 use only those that see the person best. Each other view is compared with their solution: its left and right
 /// are swapped if it then fits better, and it is left out if it contradicts the solution.
 ///
 /// * Returns `None` if no joint is seen by at least two views.

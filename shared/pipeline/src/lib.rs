@@ -28,6 +28,7 @@ mod skeleton_step;
 mod space;
 mod space_settings;
 mod space_step;
+mod thumbnail;
 mod tracks;
 mod view_result;
 mod view_step;

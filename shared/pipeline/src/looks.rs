@@ -70,8 +70,8 @@ fn pace(track: &Track, before: Option<&Seen>, seen: &Seen, n_frames: Option<u64>
 }
 
 impl Looks<'_> {
-    /// Reuses the last sightings of people who stand still. The network still runs in every frame on the first person, and on a person
-    /// behind a larger one.
+    /// Reuses the last sightings of people who stand still, or whose picture has not changed. The network still runs in every frame on the
+    /// first person. It also runs on a person behind a larger one, unless the picture has not changed.
     ///
     /// * `before`: the people of the previous frame; the entries of the reused people are overwritten.
     pub(crate) fn hold_still(
@@ -88,12 +88,17 @@ impl Looks<'_> {
             let track = &mut others[0];
             let is_behind = |larger: &Track| overlap(larger.outline, track.outline) > BEHIND;
             let n_frames = track.n_held + hold.gap;
+            let Some(before) = before.get_mut(track.index) else {
+                continue;
+            };
             // Run the network one frame early: by the next frame, the person would have moved too far.
-            if n_frames < hold.most
+            let is_still = n_frames < hold.most
                 && track.is_still(n_frames + 1)
-                && !larger.iter().any(is_behind)
-                && let Some(before) = before.get_mut(track.index)
-            {
+                && !larger.iter().any(is_behind);
+            let is_unchanged = n_frames <= hold.most_to_save
+                && !track.is_doubtful
+                && before.thumbnail.is_some_and(|thumbnail| thumbnail.is_unchanged(self.image));
+            if is_still || is_unchanged {
                 track.is_seen = self.hold(track, n_frames, before, memory);
             }
         }

@@ -6,6 +6,7 @@ use skeleton::MIRRORED;
 use skeleton::body::N_JOINTS;
 use statistics::Sorted;
 
+use crate::thumbnail::Thumbnail;
 use crate::tracks::{Moved, Pace, Track, wider};
 
 /// Maximum distance at which two joints count as the same, as a fraction of the height of the network's window. The next constant is the
@@ -115,6 +116,8 @@ pub(crate) struct Seen {
     pub(crate) front: Option<FrontEvidence>,
     /// Colour of the trunk, as in [`Sighting`](crate::Sighting).
     pub(crate) colour: Option<[f32; 3]>,
+    /// The picture of the person when the network last ran on it.
+    pub(crate) thumbnail: Option<Thumbnail>,
 }
 
 impl NetworkMemory {

@@ -16,6 +16,7 @@ use crate::looks::{Looks, of_others};
 use crate::network_memory::{NetworkMemory, Seen};
 use crate::placed::N;
 use crate::sighting::Sighting;
+use crate::thumbnail::Thumbnail;
 use crate::tracks::{MUCH_WORSE, Track};
 use crate::view_result::ExtraKeypoint;
 
@@ -165,6 +166,10 @@ impl NetworkStep {
         let n_seen = memory.n_seen;
         for seen in memory.seen[..n_seen].iter_mut().filter(|seen| seen.age == 0) {
             seen.colour = trunk_colour(image, &Sighting::new(seen.maps.peaks(), 0.0).joints);
+            // A person whose sighting was reused keeps the picture on which the network ran.
+            if seen.next.is_none() {
+                seen.thumbnail = Thumbnail::new(image, seen.outline);
+            }
         }
         if memory.n_seen == 0 {
             memory.empty.clear();

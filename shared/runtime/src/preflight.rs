@@ -152,6 +152,9 @@ mod tests {
 
     use super::*;
 
+    /// Bytes of a chunk besides its values.
+    const HEADERS: u64 = size_of::<EvidenceHeader>() as u64 + 64;
+
     /// Returns the topic of response maps of 40 MB that two processes read, each of which borrows two of them.
     fn evidence(view: usize, delivery: Delivery) -> TopicPlan {
         let limits = Limits::new(2, 1, 2);
@@ -169,14 +172,14 @@ mod tests {
     #[test]
     fn the_number_of_chunks_is_subscribers_times_queued_and_borrowed_plus_one_loan() {
         // 2 workers x (1 queued + 2 borrowed) + 1 loan, of 40 MB and the headers.
-        let chunk = 40_000_000 + 1472;
+        let chunk = 40_000_000 + HEADERS;
         assert_eq!(evidence(0, Delivery::Realtime).pool_bytes(), 7 * chunk);
     }
 
     #[test]
     fn with_lossless_delivery_evidence_needs_one_chunk_more_than_the_receivers_hold() {
         let bytes = evidence(0, Delivery::Lossless).pool_bytes();
-        assert_eq!(bytes, 3 * (40_000_000 + 1472));
+        assert_eq!(bytes, 3 * (40_000_000 + HEADERS));
     }
 
     #[test]

@@ -282,7 +282,7 @@ fn a_rotated_camera_is_left_out_if_three_others_agree() {
     }
 }
 
-/// Of many views, only a few give the first solution; all give the last one.
+/// With many views, only a few give the first solution; all give the last one.
 #[test]
 fn many_views_are_solved_with_a_swapped_one_a_rotated_one_and_a_joint_that_two_of_them_see() {
     let cameras: Vec<Camera> = (0..14).map(|nth| camera(7.0 + 26.0 * f64::from(nth))).collect();

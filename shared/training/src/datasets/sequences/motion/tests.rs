@@ -273,7 +273,7 @@ fn files_that_cannot_be_used_are_refused() {
         "{got}"
     );
     let got = refused(read("a.trc", text.replace("\n50\t", "\n0\t"), &options));
-    assert_eq!(got, "trc: 0 frames per second");
+    assert_eq!(got, "trc: the frame rate is 0 Hz, expected 1 to 100000 Hz");
     let got = refused(read("a.trc", text.replace("\tm\n", "\tmiles\n"), &options));
     assert!(got.contains("unit \"miles\" is not known"), "{got}");
     let beyond = MotionOptions {
