@@ -95,7 +95,8 @@ pub(crate) struct Arguments {
     /// Settings for fusion: a TOML file with the keys of `[paper]`.
     #[arg(long, value_name = "FILE")]
     paper: Option<PathBuf>,
-    /// Learned consistency (a file of `train consistency`), instead of the file in --paper; "shipped" for the shipped file.
+    /// Consistency file, written by `train consistency`: tables of part types, weights and thresholds; "shipped" for the shipped file. It
+    /// replaces the file that the key `consistency` in --paper names.
     #[arg(long, value_name = "FILE")]
     consistency: Option<PathBuf>,
     /// Network that estimates the direction in which people face, to distinguish left from right (`train orientation`); "shipped" for the

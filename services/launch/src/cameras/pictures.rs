@@ -95,12 +95,12 @@ impl<'a> Tagged<'a> {
     fn does_turn(&self, camera: &str, rig: &Rig) -> bool {
         let (does_turn, why) = by_calibration(camera, rig, self.stored, self.tag);
         let done = if does_turn {
-            "which is applied"
+            "is applied"
         } else {
-            "which is not applied"
+            "is not applied"
         };
         tracing::warn!(
-            "camera {camera:?}: the orientation tag of {} asks for its pictures to be {}, {done}: {why}",
+            "camera {camera:?}: the orientation tag of {} ({}) {done}: {why}",
             self.source,
             self.tag
         );
@@ -152,7 +152,7 @@ fn by_calibration(name: &str, rig: &Rig, stored: Size, tag: Turn) -> (bool, Stri
     };
     (
         does_turn,
-        format!("with the calibration people {how} then; {BY_HAND}"),
+        format!("according to the calibration, people then {how}; {BY_HAND}"),
     )
 }
 

@@ -29,7 +29,7 @@ const MOST_BONES: f64 = 0.2;
 pub enum PeopleError {
     /// There is only one camera, or the number of films differs from the number of cameras.
     #[error(
-        "there are {cameras} cameras and {films} films, but at least 2 cameras are needed, each with its film"
+        "there are {cameras} cameras and footage of {films}, but at least 2 cameras are needed, each with its footage"
     )]
     Number {
         /// Number of cameras.

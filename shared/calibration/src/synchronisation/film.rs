@@ -36,7 +36,7 @@ pub struct Joint {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FilmError {
     /// The number of films differs from the number of cameras.
-    #[error("{films} films were given for {cameras} cameras, but each camera needs one film")]
+    #[error("there are {cameras} cameras, but footage of {films}; each camera needs its footage")]
     Number {
         /// Number of films.
         films: usize,

@@ -42,8 +42,8 @@ Example:
 pub(crate) struct Arguments {
     #[command(flatten)]
     people: Marked,
-    /// Teacher: a network that finds keypoints, to improve joints and sides. Repeat the option for further networks. Each adds the
-    /// keypoints that earlier networks do not have.
+    /// Teacher: a network that finds keypoints, to add and correct the annotated joints and sides. Repeat the option for further networks.
+    /// Each adds the keypoints that earlier networks do not have.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Vec<PathBuf>,
     /// Cards of the teachers, in the same order. If not given, the files beside them.
