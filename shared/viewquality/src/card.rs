@@ -264,7 +264,13 @@ fn colour(
 fn tau(value: &str, n_parts: usize) -> Result<Vec<f32>, CardError> {
     let read = numbers(value, |value| (0.0..=f32::MAX).contains(&value));
     let read = read.filter(|values| values.len() == n_parts);
-    read.ok_or_else(|| entry(key::TAU, value, format!("{n_parts} finite numbers from 0")))
+    read.ok_or_else(|| {
+        entry(
+            key::TAU,
+            value,
+            format!("{n_parts} finite numbers of at least 0"),
+        )
+    })
 }
 
 #[cfg(test)]

@@ -58,8 +58,7 @@ pub enum TableError {
     },
     /// An expected error is not a valid number of pixels.
     #[error(
-        "line {line}, column {column}: expected error of part {part} is `{got}`, expected a finite \
-         number of pixels from 0"
+        "line {line}, column {column}: the expected error of part {part} is `{got}`, but must be a finite number of at least 0 (in pixels)"
     )]
     Number {
         /// Number of the line, from 1.
@@ -351,8 +350,7 @@ mod tests {
     fn rejects_invalid_expected_errors() {
         for bad in ["NaN", "nan", "inf", "-0.5", "1e39", "", "x"] {
             let expected = format!(
-                "line 2, column 6: expected error of part 2 is `{bad}`, expected a finite number of \
-                 pixels from 0"
+                "line 2, column 6: the expected error of part 2 is `{bad}`, but must be a finite number of at least 0 (in pixels)"
             );
             assert_eq!(
                 outcome(&format!("S,A,1,C,1,2\nS,A,2,C,1,{bad}\n")),

@@ -52,7 +52,9 @@ pub struct Tau {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum TauError {
     /// A field is not a valid number of pixels.
-    #[error("line {line}: `{got}` is not a threshold in pixels, expected a finite number from 0")]
+    #[error(
+        "line {line}: `{got}` is not a threshold in pixels, expected a finite number of at least 0"
+    )]
     Number {
         /// Number of the line, from 1.
         line: usize,
@@ -164,7 +166,7 @@ mod tests {
     fn rejects_invalid_thresholds() {
         for bad in ["NaN", "inf", "-1", "1e39", "x"] {
             let expected = format!(
-                "line 2: `{bad}` is not a threshold in pixels, expected a finite number from 0"
+                "line 2: `{bad}` is not a threshold in pixels, expected a finite number of at least 0"
             );
             let error = Tau::parse(&format!("1\n2 {bad}"), 3).unwrap_err().to_string();
             assert_eq!(error, expected);

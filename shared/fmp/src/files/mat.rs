@@ -166,7 +166,7 @@ impl<'v, 'a> At<'v, 'a> {
         if value.fract() == 0.0 && (0.0..1e9).contains(&value) {
             Ok(value as usize)
         } else {
-            Err(self.wrong(value, "a whole number from 0"))
+            Err(self.wrong(value, "a whole number of at least 0"))
         }
     }
 

@@ -74,7 +74,7 @@ const MAX_SPRINGS: usize = MAX_FILTERS * Model::MAX_TYPES;
 const MAX_SETTING: usize = 1 << 16;
 /// Number of weights of a spring, `dx^2 dx dy^2 dy`.
 const SPRING_WEIGHTS: usize = 4;
-const INDEX: &str = "a whole number from 0";
+const INDEX: &str = "a whole number of at least 0";
 const REAL: &str = "a number";
 
 fn count(

@@ -292,8 +292,12 @@ impl Learned {
             "a list of mutual mirror parts, one for every part",
         )?;
         let it = &self.weights;
-        demand(in_range(it.alpha), "weights.alpha", "a number from 0")?;
-        demand(in_range(it.beta), "weights.beta", "a number from 0")?;
+        demand(
+            in_range(it.alpha),
+            "weights.alpha",
+            "a number of at least 0",
+        )?;
+        demand(in_range(it.beta), "weights.beta", "a number of at least 0")?;
         let cap = it.max_distance_cells.is_none_or(|value| value.is_finite() && value > 0.0);
         demand(
             cap,
@@ -307,7 +311,7 @@ impl Learned {
                 .tau_tenths
                 .iter()
                 .all(|tau_tenth| tau_tenth.is_finite() && *tau_tenth >= 0.0);
-        demand(tau, "tau_tenths", "a number from 0 for every part")?;
+        demand(tau, "tau_tenths", "a number of at least 0 for every part")?;
         self.check_tables()?;
         self.check_joints(n_parts)
     }

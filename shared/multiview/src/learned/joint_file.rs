@@ -201,7 +201,11 @@ impl JointFile {
             )?;
         }
         let it = &self.learned;
-        demand(in_range(it.ridge), "learned.ridge", "a number from 0")?;
+        demand(
+            in_range(it.ridge),
+            "learned.ridge",
+            "a number of at least 0",
+        )?;
         demand(
             it.reach <= N_PARTS,
             "learned.reach",
@@ -214,7 +218,7 @@ impl JointFile {
                 ("error_before", set.error_before),
                 ("error_after", set.error_after),
             ] {
-                demand(in_range(error), &field(name), "a number from 0")?;
+                demand(in_range(error), &field(name), "a number of at least 0")?;
             }
         }
         Ok(())

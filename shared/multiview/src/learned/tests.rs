@@ -233,7 +233,7 @@ fn a_wrong_file_is_refused_with_the_field() {
         (
             "/weights/alpha",
             json!(-1.0),
-            "`weights.alpha` is not a number from 0",
+            "`weights.alpha` is not a number of at least 0",
         ),
         (
             "/weights/max_distance_cells",
@@ -248,7 +248,7 @@ fn a_wrong_file_is_refused_with_the_field() {
         (
             "/tau_tenths",
             json!([1.0]),
-            "`tau_tenths` is not a number from 0 for every part",
+            "`tau_tenths` is not a number of at least 0 for every part",
         ),
         (
             "/smoothing",

@@ -90,7 +90,7 @@ fn the_card_of_a_file_is_read() {
     net.metadata.push(("parallax.tau".to_owned(), "1".to_owned()));
     assert_eq!(
         rejection(&net),
-        "`parallax.tau` is `1`, expected 2 finite numbers from 0"
+        "`parallax.tau` is `1`, expected 2 finite numbers of at least 0"
     );
 }
 

@@ -103,7 +103,7 @@ fn errors_name_the_field() {
     let cases: [(&str, &str, Change); 9] = [
         (
             "sbin",
-            "`model.sbin` holds 4.5, expected a whole number from 0",
+            "`model.sbin` holds 4.5, expected a whole number of at least 0",
             |mat| *mat = number(4.5),
         ),
         ("thresh", "`model.thresh` is 1x2, expected 1x1", |mat| {

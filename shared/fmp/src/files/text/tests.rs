@@ -105,12 +105,12 @@ fn errors_name_the_line_and_the_field() {
         (
             "typesNbr 2",
             "typesNbr two",
-            "line 2 (token 4): `typesNbr` expects a whole number from 0, got `two`",
+            "line 2 (token 4): `typesNbr` expects a whole number of at least 0, got `two`",
         ),
         (
             "typesNbr 2",
             "typesNbr -2",
-            "line 2 (token 4): `typesNbr` expects a whole number from 0, got `-2`",
+            "line 2 (token 4): `typesNbr` expects a whole number of at least 0, got `-2`",
         ),
         (
             "typesNbr 2",
