@@ -379,7 +379,7 @@ impl Supply {
 
 /// Never returns, like a process that is stuck in a computation.
 fn spin() -> ! {
-    tracing::warn!("looping forever, on purpose");
+    tracing::warn!("injected fault: this process now loops forever");
     loop {
         core::hint::spin_loop();
     }

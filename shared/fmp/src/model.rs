@@ -160,7 +160,7 @@ pub enum ModelError {
     },
     /// The mirror permutation does not swap parts in pairs, or does not preserve the tree.
     #[error(
-        "part {part} mirrors part {other}, but part {other} does not mirror it, or the tree differs"
+        "part {part} mirrors part {other}, but part {other} does not mirror it, or their parents do not mirror each other"
     )]
     Mirror {
         /// The part in question, counted from 1.

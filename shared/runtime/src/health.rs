@@ -341,7 +341,7 @@ impl Counts {
 }
 
 fn spin() -> ! {
-    tracing::warn!("looping forever, on purpose");
+    tracing::warn!("injected fault: this process now loops forever");
     loop {
         core::hint::spin_loop();
     }

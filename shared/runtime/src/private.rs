@@ -79,7 +79,7 @@ pub enum PrivacyError {
         n_files: usize,
     },
     /// The file or directory cannot be read, created, or closed to others.
-    #[error("cannot reserve {path:?} for this user alone")]
+    #[error("cannot open or create {path:?}, or cannot deny other users access to it")]
     File {
         /// The file or directory.
         path: PathBuf,

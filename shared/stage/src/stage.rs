@@ -290,7 +290,11 @@ impl<'a, T: 'a> Stage<'a, T> {
         for output in &self.outgoing {
             let [n, expected] = output.wait(patience);
             if n < expected {
-                tracing::warn!(n, expected, "beginning without all receivers");
+                tracing::warn!(
+                    n,
+                    expected,
+                    "starting although some receivers are not connected"
+                );
             }
         }
         tracing::info!("begins");

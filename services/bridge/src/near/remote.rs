@@ -103,7 +103,8 @@ impl Remote {
             let why = listed(why);
             tracing::warn!(
                 host = self.name,
-                "the host is not accepted, because its files or settings differ (in this list, \"this host\" is that host): {why}"
+                "the host is not accepted, because its files or settings differ (\"this host\" in the following list means {}): {why}",
+                self.name
             );
         }
         state.refused = Some(why.to_vec());

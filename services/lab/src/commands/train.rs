@@ -108,7 +108,7 @@ pub(crate) struct Arguments {
     /// Number of threads, which does not affect the model. If not given, one per core.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-    /// Folder of images without people, to count false alarms after the training. If not given, the negatives.
+    /// Folder of images without people, to count false alarms after the training. If not given, the images of --negatives.
     #[arg(long, value_name = "DIR")]
     judge: Option<PathBuf>,
     /// Continue from the checkpoint of an interrupted training. If there is no checkpoint, start from the beginning.

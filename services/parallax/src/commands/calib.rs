@@ -62,8 +62,8 @@ pub(crate) struct Input {
     /// The calibration file, or one file per camera.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Unit of length, if the format does not define it: m, cm, mm, ft, or in. If the calibration uses the squares of a board as its unit,
-    /// the size of a square, such as 30mm.
+    /// Unit of length, if the format does not define it: m, cm, mm, ft, or in. If the unit of the calibration
+    /// is the square of a board, give the side of a square, such as 30mm.
     #[arg(long)]
     unit: Option<Unit>,
     /// Upward direction in the world, if the file does not give it.

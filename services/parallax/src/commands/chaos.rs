@@ -102,8 +102,8 @@ pub(crate) struct Arguments {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Limits")]
 struct Limits {
-    /// Longest time from the fault until the process contributes to a result again, in milliseconds. If results do not show whether
-    /// the process contributed, the time until it reports that it has worked.
+    /// Longest time from the fault until the process contributes to a result again, in milliseconds. For a process whose
+    /// work cannot be seen in results, the time ends when the process reports that it has handled messages again.
     #[arg(long, value_name = "MS", default_value_t = 8000.0)]
     max_return_ms: f64,
     /// Longest pause between results while a process is missing, if the other processes do not need it, in milliseconds.

@@ -475,11 +475,11 @@ mod tests {
     fn the_mirror_swaps_parts_in_pairs_and_keeps_the_tree() {
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![1, 2, 0])),
-            "part 1 mirrors part 2, but part 2 does not mirror it, or the tree differs"
+            "part 1 mirrors part 2, but part 2 does not mirror it, or their parents do not mirror each other"
         );
         assert_eq!(
             outcome(|model| model.mirror = Some(vec![2, 1, 0])),
-            "part 1 mirrors part 3, but part 3 does not mirror it, or the tree differs"
+            "part 1 mirrors part 3, but part 3 does not mirror it, or their parents do not mirror each other"
         );
         assert_eq!(outcome(|model| model.mirror = Some(vec![0, 1, 2])), "fine");
         // Three arms in a cycle: the tree is preserved, but parts are not swapped in pairs.
@@ -487,7 +487,7 @@ mod tests {
             model.parts.push(model.parts[2].clone());
             model.mirror = Some(vec![0, 2, 3, 1]);
         });
-        let expected = "part 2 mirrors part 3, but part 3 does not mirror it, or the tree differs";
+        let expected = "part 2 mirrors part 3, but part 3 does not mirror it, or their parents do not mirror each other";
         assert_eq!(ring, expected);
     }
 }

@@ -48,7 +48,7 @@ pub enum ReadingError {
     #[error("the name of the view is not UTF-8, or has text after its end")]
     Name,
     /// A flag is neither 0 nor 1.
-    #[error("finished is {finished}, neither 0 nor 1")]
+    #[error("finished is {finished}, expected 0 or 1")]
     Flag {
         /// Value of the flag.
         finished: u32,

@@ -89,7 +89,7 @@ pub enum TableError {
     },
     /// A mirror that is not its own inverse.
     #[error(
-        "the mirror of {what} {index} ({name}) is {other}, but not vice versa, or it does not exist"
+        "the mirror of {what} {index} ({name}) is {what} {other}, but {what} {other} does not exist or has another mirror"
     )]
     Mirror {
         /// `part` or `joint`.

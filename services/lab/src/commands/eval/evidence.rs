@@ -25,13 +25,13 @@ pub(super) struct Options {
         conflicts_with_all = ["model", "versions", "paper", "consistency", "sigma", "network", "oracle", "resume", "only", "without"]
     )]
     pub(super) network_evidence: Option<PathBuf>,
-    /// Card of the network. If not given, the file beside it, or the card in its metadata.
+    /// Card of the network. If not given, the .toml file of the same name beside the network, or the network's entry `parallax.card`.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     card: Option<PathBuf>,
     /// Detector (ONNX) that finds the boxes of people. If not given, the shipped detector.
     #[arg(long, value_name = "FILE", requires = "network_evidence")]
     pub(super) detector: Option<PathBuf>,
-    /// Card of the detector. If not given, the file beside it, or the card in its metadata.
+    /// Card of the detector. If not given, the .toml file of the same name beside the detector, or the detector's entry `parallax.card`.
     #[arg(long, value_name = "FILE", requires = "detector")]
     detector_card: Option<PathBuf>,
     /// Disturbances to add, separated by commas: clean (none), covered:N (half of the person in N views), views:N (only N views),

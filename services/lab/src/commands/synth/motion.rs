@@ -16,7 +16,7 @@ pub(super) struct MotionArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["actions", "live"])]
     motion: Option<PathBuf>,
     /// Table that maps the markers of the file to joints: cmu, pose2sim, parallax, optitrack36, or a file like those in configs/markers. If
-    /// not given, the first of these four tables for which the file has all markers.
+    /// not given, the first of the four named tables whose markers are all in the file.
     #[arg(long, value_name = "TABLE", requires = "motion")]
     markers: Option<PathBuf>,
     /// First and last frame, as numbered in the file. If not given, all frames.

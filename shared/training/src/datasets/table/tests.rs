@@ -85,11 +85,11 @@ fn errors_of_invalid_skeletons_have_name_and_number() {
             |table| table.parent[2] = Some(2),
         ),
         (
-            "the mirror of part 15 (left shoulder) is 3, but not vice versa, or it does not exist",
+            "the mirror of part 15 (left shoulder) is part 3, but part 3 does not exist or has another mirror",
             |table| table.mirror[2] = 2,
         ),
         (
-            "the mirror of joint 14 (head) is 100, but not vice versa, or it does not exist",
+            "the mirror of joint 14 (head) is joint 100, but joint 100 does not exist or has another mirror",
             |table| table.joint_mirror[13] = 99,
         ),
         (

@@ -28,7 +28,7 @@ Example:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(crate) struct Arguments {
-    /// Files of pictures, prepared by `train finder-pictures`.
+    /// File of pictures, prepared by `train finder-pictures`.
     #[arg(value_name = "PICTURES", required_unless_present = "print_settings")]
     pictures: Option<PathBuf>,
     #[command(flatten)]

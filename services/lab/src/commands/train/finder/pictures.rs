@@ -41,7 +41,7 @@ pub(crate) struct Arguments {
     /// Teacher: a detector that finds all people in the photographs.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Option<PathBuf>,
-    /// Card of the teacher. If not given, the file beside it.
+    /// Card of the teacher. If not given, the .toml file of the same name beside the teacher, or the teacher's entry `parallax.card`.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Option<PathBuf>,
     /// Folder of photographs without people. The photographs are also used as the background of every third scene.

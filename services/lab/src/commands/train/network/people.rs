@@ -46,7 +46,8 @@ pub(crate) struct Arguments {
     /// Each adds the keypoints that earlier networks do not have.
     #[arg(long, value_name = "FILE.onnx")]
     teacher: Vec<PathBuf>,
-    /// Cards of the teachers, in the same order. If not given, the files beside them.
+    /// Cards of the teachers, in the same order. If not given, the .toml file of the same name beside each teacher, or the teacher's
+    /// entry `parallax.card`.
     #[arg(long, value_name = "FILE.toml", requires = "teacher")]
     teacher_card: Vec<PathBuf>,
     /// Number of synthetic scenes. Each scene gives several pictures from every camera.
