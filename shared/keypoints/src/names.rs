@@ -256,7 +256,7 @@ const FACES: [(&[&str], f64, f64); 8] = [
 /// Returns the rules that compute every joint of `skeleton::PARSE14` from keypoints, best first. A joint that cannot be computed from the
 /// keypoints has no rules.
 ///
-/// A keypoint with the joint's name is used as the joint. The neck can also be computed as the middle of the shoulders. The top of the head
+/// A keypoint with the joint's name is used as the joint (`head` or `head top` as the top of the head). The neck can also be computed as the middle of the shoulders. The top of the head
 /// can also be computed from a part of the face: it lies on the line from the neck through the middle of eyes and ears, at 1.6 times the
 /// distance to that middle.
 pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
@@ -284,7 +284,10 @@ pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     let ways = |name: &str| -> Vec<Way> {
         match name {
             "neck" => necks().into_iter().flatten().map(way).collect(),
-            "head" => mean(&["head top"]).map(way).into_iter().chain(heads()).collect(),
+            "head" => {
+                let top = mean(&["head top"]).or_else(|| mean(&["head"]));
+                top.map(way).into_iter().chain(heads()).collect()
+            }
             name => mean(&[name]).map(way).into_iter().collect(),
         }
     };
@@ -399,6 +402,14 @@ mod tests {
             None,
             "without a neck there is no direction"
         );
+    }
+
+    #[test]
+    fn keypoints_with_the_names_of_the_skeleton_give_all_joints() {
+        let names: Vec<&str> = PARSE14.joints.iter().map(|joint| joint.name).collect();
+        let rows = joint_rows(&owned(&names));
+        let expected: Vec<_> = (0..names.len()).map(|nth| Some(vec![(nth, 1.0)])).collect();
+        assert_eq!(rows, expected);
     }
 
     #[test]
