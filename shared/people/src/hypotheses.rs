@@ -1,8 +1,9 @@
 //! Candidate positions of a person's joint: positions proposed by rays, each with its support from the views.
 
+use geometry::Sightline;
 use nalgebra::Point3;
 
-use crate::sight::{Prior, Sight, agreement, passing};
+use crate::sight::{MOST_PROPOSING, Prior, Sight, agreement, passing};
 
 /// Two rays propose no position if the distance between them exceeds this many standard deviations.
 const APART: f64 = 3.0;
@@ -11,7 +12,7 @@ const MOST: usize = 12;
 /// Positions closer together than this count as the same, in metres.
 const SAME_M: f64 = 0.02;
 /// Maximum distance of a joint from its expected position, in metres.
-const RADIUS_M: f64 = 0.6;
+pub(crate) const RADIUS_M: f64 = 0.6;
 /// A single view proposes a position if its ray passes the expected position within this distance, in standard deviations of the expected
 /// position.
 const BESIDE: f64 = 3.0;
@@ -39,6 +40,11 @@ pub(crate) struct Hypothesis {
     pub(crate) support: f64,
 }
 
+/// Returns true if a ray can support a position near the centre of the search.
+pub(crate) fn may_reach(sight: &Sight, near: &Point3<f64>) -> bool {
+    sight.distance(near) < RADIUS_M + APART * sight.sd(near)
+}
+
 /// Returns the support of a position: the sum over the views of the strongest support from a candidate of that view.
 ///
 /// * `candidates`: sorted so that the candidates of one view are adjacent.
@@ -52,6 +58,37 @@ pub(crate) fn support(candidates: &[Candidate], place: &Point3<f64>) -> f64 {
         .sum()
 }
 
+/// Returns the views whose pairs of rays propose positions: of many views, those that see the joint best from directions that cross at wide
+/// angles. Also returns true if some views do not propose positions.
+fn proposing(candidates: &[Candidate]) -> (Vec<usize>, bool) {
+    let views = candidates.chunk_by(|a, b| a.view == b.view);
+    let weight = |candidate: &Candidate| candidate.trust * candidate.sight.heat;
+    let best = views.filter_map(|view| {
+        let best = view.iter().max_by(|a, b| weight(a).total_cmp(&weight(b)))?;
+        let line = Sightline {
+            direction: best.sight.direction,
+            weight: weight(best),
+        };
+        Some((best.view, line))
+    });
+    let (views, lines): (Vec<usize>, Vec<Sightline>) = best.unzip();
+    let chosen = geometry::widest_apart(&lines, MOST_PROPOSING).into_iter();
+    let chosen: Vec<usize> = chosen.map(|nth| views[nth]).collect();
+    let is_many = chosen.len() < views.len();
+    (chosen, is_many)
+}
+
+/// Returns positions that are not the same as an earlier one. With many views, computing the support of each takes long.
+fn spaced(places: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    let mut kept: Vec<Point3<f64>> = Vec::new();
+    for place in places {
+        if kept.iter().all(|other| (other - place).norm() > SAME_M) {
+            kept.push(*place);
+        }
+    }
+    kept
+}
+
 /// Returns the candidate positions of a joint, the best supported first.
 ///
 /// * `near`: centre of the search.
@@ -62,13 +99,16 @@ pub(crate) fn hypotheses(
     prior: Option<Prior>,
 ) -> Vec<Hypothesis> {
     let mut places = Vec::new();
+    let (proposing, is_many) = proposing(candidates);
     for (nth, a) in candidates.iter().enumerate() {
-        for b in candidates[nth + 1..].iter().filter(|b| b.view != a.view) {
+        let proposes = |candidate: &Candidate| proposing.contains(&candidate.view);
+        let others = candidates[nth + 1..].iter().filter(|b| b.view != a.view && proposes(b));
+        for b in others.filter(|_| proposes(a)) {
             let Some(at) = passing(&a.sight, &b.sight) else {
                 continue;
             };
-            let sd = a.sight.sd(&at.point).hypot(b.sight.sd(&at.point));
-            if at.gap < APART * sd {
+            let variance = a.sight.sd(&at.point).powi(2) + b.sight.sd(&at.point).powi(2);
+            if at.gap * at.gap < APART * APART * variance {
                 places.push(at.point);
             }
         }
@@ -83,6 +123,9 @@ pub(crate) fn hypotheses(
         places.retain(|place| (place - near).norm() < RADIUS_M);
     }
     places.extend(prior.map(|prior| prior.point));
+    if is_many {
+        places = spaced(&places);
+    }
     let each = places.into_iter().map(|place| Hypothesis {
         place,
         support: support(candidates, &place),

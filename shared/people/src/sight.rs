@@ -54,7 +54,12 @@ impl Sight {
     /// Returns the standard deviation of the ray at the distance of a point, in metres. It is at least the minimum that applies even where
     /// the picture is sharp.
     pub(crate) fn sd(&self, point: &Point3<f64>) -> f64 {
-        FLOOR_M.hypot(self.stated(point))
+        let stated = self.stated(point);
+        #[expect(
+            clippy::imprecise_flops,
+            reason = "`hypot` is slow, and metres do not overflow"
+        )]
+        (FLOOR_M * FLOOR_M + stated * stated).sqrt()
     }
 
     /// Returns the distance of a point from the ray, in standard deviations.
@@ -129,7 +134,7 @@ pub(crate) struct Met {
 const OUTLYING: f64 = 3.0;
 /// Maximum number of rays whose pairs propose a position. Each position is compared with all rays, so without this limit, the time would
 /// grow with the cube of the number of views.
-const MOST_PROPOSING: usize = 6;
+pub(crate) const MOST_PROPOSING: usize = 6;
 
 /// Triangulates the joint on which most of the rays agree, each weighted by its deviation and heat.
 ///
@@ -174,8 +179,14 @@ pub(crate) fn meet(sights: &[Sight]) -> Option<Met> {
     })
 }
 
+/// A ray farther away than this many standard deviations gives no support; its Gaussian is below a hundred-thousandth.
+const NO_AGREEMENT: f64 = 5.0;
+
 /// Returns the support, from 0 to 1, that a ray gives to a position at a distance of this many standard deviations.
 pub(crate) fn agreement(deviations: f64) -> f64 {
+    if deviations > NO_AGREEMENT {
+        return 0.0;
+    }
     (-0.5 * deviations * deviations).exp()
 }
 

@@ -7,8 +7,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use skeleton::body::{Covariances, Joints};
 
 use crate::distance::named;
-use crate::hypotheses::{Candidate, Hypothesis, hypotheses};
-use crate::sight::{Prior, Sight, Sights, settle, sights};
+use crate::hypotheses::{Candidate, Hypothesis, RADIUS_M, hypotheses, may_reach};
+use crate::sight::{Met, Prior, Sight, Sights, meet, settle, sights};
 use crate::tree::{Choice, Expectations, choose};
 use crate::{N, Person, View};
 
@@ -29,6 +29,8 @@ const MOVED: f64 = 0.25;
 const MOST_OF_MOVED: f64 = 0.5;
 /// Rays farther from the joint than this many standard deviations are ignored.
 const OUTLYING: f64 = 3.0;
+/// Number of a person's own rays that, if they agree on a place far from the expected one, show that the joint is not where it was expected.
+const SURE: usize = 3;
 /// Stature assumed for a person whose stature is unknown, in metres.
 const ANY_STATURE_M: f64 = 1.7;
 
@@ -78,8 +80,8 @@ impl Knowledge {
 /// The candidate positions of a joint are the points where suitable rays meet. These are the rays of the person's detections and, with a
 /// lower weight, rays that the detector assigned to other people or to nobody. The solver chooses one position for each joint, by three
 /// criteria: the support from the views, the distance from the expected position, and the bone lengths of a person of this stature. The
-/// choice is exact over the tree of the body. Then every joint moves to minimise the squared distances to its rays. Finally, the bone
-/// lengths correct the joints in proportion to their uncertainty.
+/// choice is exact over the tree of the body. Then every joint moves to minimise the squared distances to its rays. The bone lengths correct
+/// only the expected positions of the next frame; the caller corrects the result (`skeleton::body::refine`).
 #[derive(Debug, Clone)]
 pub struct Solver {
     cameras: Vec<Camera>,
@@ -119,50 +121,72 @@ impl Solver {
             .map(|(camera, view)| rays(camera, view))
             .collect();
         self.known.retain(|_, known| time_s - known.time_s <= CARRIED_S);
-        let solved = people.iter().map(|person| self.solve(time_s, person, people, &rays));
-        solved.collect::<Vec<Solved>>()
-    }
-
-    fn solve(&mut self, time_s: f64, person: &Person, people: &[Person], rays: &[Rays]) -> Solved {
-        let known = self.known.entry(person.id).or_default();
-        let candidates: [Vec<Candidate>; N] =
-            core::array::from_fn(|joint| candidates(joint, person, people, (&self.order, rays)));
-        let priors: [Option<Prior>; N] =
-            core::array::from_fn(|joint| known.expected(joint, time_s));
-        let places: [Vec<Hypothesis>; N] = core::array::from_fn(|joint| {
-            let near = priors[joint].map(|prior| prior.point).or(person.joints[joint]);
-            hypotheses(&candidates[joint], near, priors[joint])
-        });
-        let choices: [Vec<Choice>; N] = core::array::from_fn(|joint| {
-            places[joint].iter().map(|place| choice(place, priors[joint])).collect()
-        });
-        let stature =
-            skeleton::body::stature(&person.joints).map_or(ANY_STATURE_M, |stature| stature.metres);
-        let expectations = Expectations::new(
-            stature.clamp(skeleton::body::STATURES[0], skeleton::body::STATURES[1]),
-        );
-        let chosen = choose(&choices, &expectations);
-        let mut solved = Solved {
-            id: person.id,
-            joints: [None; N],
-            covariances: [None; N],
-            n_views: [0; N],
+        let scene = Scene {
+            people,
+            order: &self.order,
+            rays: &rays,
         };
-        for joint in 0..N {
-            let Some(nth) = chosen[joint] else { continue };
-            let start = places[joint][nth].place;
-            let met = refined(&candidates[joint], start, priors[joint]);
-            if let Some((point, covariance, n)) = met {
-                solved.joints[joint] = Some(point);
-                solved.covariances[joint] = Some(covariance);
-                solved.n_views[joint] = n;
-            }
-        }
-        let refined = skeleton::body::refine(&solved.joints, &solved.covariances, None);
-        (solved.joints, solved.covariances) = (refined.joints, refined.covariances);
-        remember(known, time_s, &solved);
-        solved
+        let known = &mut self.known;
+        let solved = people.iter().map(|person| {
+            let known = known.entry(person.id).or_default();
+            solve(time_s, person, &scene, known)
+        });
+        solved.collect()
     }
+}
+
+/// Computes the joints of a person.
+fn solve(time_s: f64, person: &Person, scene: &Scene<'_>, known: &mut Knowledge) -> Solved {
+    let own: [Option<Met>; N] = core::array::from_fn(|joint| scene.own(joint, person));
+    let priors: [Option<Prior>; N] = core::array::from_fn(|joint| {
+        let prior = known.expected(joint, time_s)?;
+        let is_elsewhere = own[joint]
+            .is_some_and(|met| met.n >= SURE && (met.point - prior.point).norm() > RADIUS_M);
+        if is_elsewhere {
+            known.joints[joint] = None;
+            return None;
+        }
+        Some(prior)
+    });
+    let near: Joints = core::array::from_fn(|joint| {
+        let prior = priors[joint].map(|prior| prior.point).or(person.joints[joint]);
+        prior.or_else(|| Some(own[joint]?.point))
+    });
+    let candidates: [Vec<Candidate>; N] =
+        core::array::from_fn(|joint| scene.candidates(joint, person, near[joint].as_ref()));
+    let places: [Vec<Hypothesis>; N] =
+        core::array::from_fn(|joint| hypotheses(&candidates[joint], near[joint], priors[joint]));
+    let choices: [Vec<Choice>; N] = core::array::from_fn(|joint| {
+        places[joint].iter().map(|place| choice(place, priors[joint])).collect()
+    });
+    let stature = skeleton::body::stature(&near).map_or(ANY_STATURE_M, |stature| stature.metres);
+    let expectations =
+        Expectations::new(stature.clamp(skeleton::body::STATURES[0], skeleton::body::STATURES[1]));
+    let chosen = choose(&choices, &expectations);
+    let mut solved = Solved {
+        id: person.id,
+        joints: [None; N],
+        covariances: [None; N],
+        n_views: [0; N],
+    };
+    for joint in 0..N {
+        let Some(nth) = chosen[joint] else { continue };
+        let start = places[joint][nth].place;
+        let met = refined(&candidates[joint], start, priors[joint]);
+        if let Some((point, covariance, n)) = met {
+            solved.joints[joint] = Some(point);
+            solved.covariances[joint] = Some(covariance);
+            solved.n_views[joint] = n;
+        }
+    }
+    let refined = skeleton::body::refine(&solved.joints, &solved.covariances, None);
+    let kept = Solved {
+        joints: refined.joints,
+        covariances: refined.covariances,
+        ..solved
+    };
+    remember(known, time_s, &kept);
+    solved
 }
 
 /// Converts a candidate position to a weighted choice for a joint.
@@ -226,6 +250,8 @@ fn refined(
             ..candidate.sight
         });
         let rays: Vec<Sight> = weighted.collect();
+        // The expected position lags behind a joint that changes its speed. It is needed where one of two rays may be wrong.
+        let prior = prior.filter(|_| rays.len() < SURE);
         let met = settle(&rays, &at, prior)?;
         at = met.point;
         result = Some((met.point, met.covariance, rays.len()));
@@ -233,53 +259,77 @@ fn refined(
     result
 }
 
-/// Returns the keypoints that may be a given joint of a person, view by view.
-fn candidates(
-    joint: usize,
-    person: &Person,
-    people: &[Person],
-    (order, rays): (&[usize], &[Rays]),
-) -> Vec<Candidate> {
-    let mut all = Vec::new();
-    for (nth, view) in order.iter().enumerate().filter(|(_, view)| **view < rays.len()) {
-        let first = all.len();
-        let name = named(joint, person.is_exchanged[*view]);
-        let mut add = |sight: Option<Sight>, trust: f64| {
-            all.extend(sight.map(|sight| Candidate {
-                view: nth,
-                sight,
-                trust,
-            }));
-        };
-        for (index, sights) in rays[*view].detections.iter().enumerate() {
-            if person.detections[*view] == Some(index) {
-                add(sights[name], 1.0);
-            } else {
-                let is_anybodys = people.iter().any(|other| other.detections[*view] == Some(index));
-                add(
-                    sights[name],
-                    if is_anybodys {
-                        TRUST_OTHERS
-                    } else {
-                        TRUST_LOOSE
-                    },
-                );
-            }
-        }
-        for sight in rays[*view].loose.get(name).into_iter().flatten() {
-            add(Some(*sight), TRUST_LOOSE);
-        }
-        let by_ray = |candidate: &Candidate| {
-            let direction = candidate.sight.direction;
-            [direction.x, direction.y, candidate.trust]
-        };
-        all[first..].sort_by(|a, b| {
-            let (a, b) = (by_ray(a), by_ray(b));
-            let each = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
-            each.fold(core::cmp::Ordering::Equal, core::cmp::Ordering::then)
+/// The rays of a frame, and the people to whom they belong.
+#[derive(Clone, Copy)]
+struct Scene<'a> {
+    people: &'a [Person],
+    /// Views in the order of their cameras' names.
+    order: &'a [usize],
+    rays: &'a [Rays],
+}
+
+impl Scene<'_> {
+    /// Triangulates a joint from the person's own detections.
+    fn own(&self, joint: usize, person: &Person) -> Option<Met> {
+        let own = self.order.iter().filter_map(|view| {
+            let sights = self.rays.get(*view)?.detections.get(person.detections[*view]?)?;
+            sights[named(joint, person.is_exchanged[*view])]
         });
+        meet(&own.collect::<Vec<Sight>>())
     }
-    all
+
+    /// Returns the keypoints that may be a given joint of a person, view by view.
+    ///
+    /// * `near`: centre of the search; candidates that cannot support a position there are left out.
+    fn candidates(
+        &self,
+        joint: usize,
+        person: &Person,
+        near: Option<&Point3<f64>>,
+    ) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        let seen = self.order.iter().enumerate();
+        for (nth, view) in seen.filter(|(_, view)| **view < self.rays.len()) {
+            let first = all.len();
+            let name = named(joint, person.is_exchanged[*view]);
+            let mut add = |sight: Option<Sight>, trust: &dyn Fn() -> f64| {
+                let near = |sight: &Sight| near.is_none_or(|near| may_reach(sight, near));
+                all.extend(sight.filter(near).map(|sight| Candidate {
+                    view: nth,
+                    sight,
+                    trust: trust(),
+                }));
+            };
+            for (index, sights) in self.rays[*view].detections.iter().enumerate() {
+                add(sights[name], &|| self.trust(person, *view, index));
+            }
+            for sight in self.rays[*view].loose.get(name).into_iter().flatten() {
+                add(Some(*sight), &|| TRUST_LOOSE);
+            }
+            let by_ray = |candidate: &Candidate| {
+                let direction = candidate.sight.direction;
+                [direction.x, direction.y, candidate.trust]
+            };
+            all[first..].sort_by(|a, b| {
+                let (a, b) = (by_ray(a), by_ray(b));
+                let each = a.iter().zip(&b).map(|(a, b)| a.total_cmp(b));
+                each.fold(core::cmp::Ordering::Equal, core::cmp::Ordering::then)
+            });
+        }
+        all
+    }
+
+    /// Returns the probability that the keypoints of a detection belong to a person.
+    fn trust(&self, person: &Person, view: usize, index: usize) -> f64 {
+        let is_of = |person: &Person| person.detections[view] == Some(index);
+        if is_of(person) {
+            1.0
+        } else if self.people.iter().any(is_of) {
+            TRUST_OTHERS
+        } else {
+            TRUST_LOOSE
+        }
+    }
 }
 
 fn rays(camera: &Camera, view: &View) -> Rays {
