@@ -281,10 +281,16 @@ pub(crate) fn who_settings(resolved: &Resolved, prepared: &Prepared) -> WhoSetti
 pub(crate) fn space_settings(resolved: &Resolved, prepared: &Prepared) -> SpaceStepSettings {
     let skeleton = &prepared.settings.skeleton;
     let least_heat = resolved.deployment.network.least_heat;
-    SpaceStepSettings {
+    let settings = SpaceStepSettings {
         joints: skeleton.joints,
         body: skeleton.body,
         ..SpaceStepSettings::for_views(least_heat, resolved.sides_as_seen)
+    };
+    let cameras = &resolved.deployment.cameras;
+    if cameras.iter().all(|camera| camera.keypoints.is_some()) {
+        settings.by_keypoints()
+    } else {
+        settings
     }
 }
 

@@ -480,7 +480,7 @@ mod tests {
                 let _pool = pool(n).build();
                 rayon::current_thread_index().map(|_| rayon::current_num_threads())
             };
-            let thread = std::thread::Builder::new().name("caller".to_owned());
+            let thread = thread::Builder::new().name("caller".to_owned());
             let caller = thread.spawn(inside).ok()?;
             caller.join().ok().flatten()
         };

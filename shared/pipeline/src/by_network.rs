@@ -9,6 +9,7 @@ use nalgebra::UnitVector3;
 use posenetwork::{LookError, PersonMaps};
 use rayon::prelude::*;
 
+use crate::frame_time::time_s;
 use crate::{
     FramePeople, NetworkMemory, NetworkStep, PersonSkeleton, SpaceStep, SpaceStepSettings,
     ViewSightings, WhoSettings, WhoStep,
@@ -160,10 +161,4 @@ impl View {
             skew_s: content.skew_s,
         }))
     }
-}
-
-/// Returns the time of a frame, in seconds; if the frame rate is unknown, a typical one is assumed.
-pub fn time_s(frame: u64, frame_rate_hz: Option<f64>) -> f64 {
-    const COMMON_HZ: f64 = 30.0;
-    frame as f64 / frame_rate_hz.unwrap_or(COMMON_HZ)
 }

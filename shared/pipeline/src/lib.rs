@@ -5,11 +5,13 @@
 #![forbid(unsafe_code)]
 
 mod bodies;
+mod by_keypoints;
 mod by_network;
 mod colour;
 mod disagreement;
 mod extras;
 mod following;
+mod frame_time;
 mod fuse_step;
 mod fused;
 mod fused_view;
@@ -38,11 +40,12 @@ mod estimate;
 
 pub use bodies::{Body, NoJoint};
 pub use by_network::{
-    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame, time_s,
+    NetworkEstimate, NetworkEstimator, NetworkEstimatorSettings, ViewContent, ViewFrame,
 };
 pub use estimate::{Estimate, Estimator, EstimatorError, EstimatorSettings, plan};
 pub use extras::ExtrasStep;
 pub use following::{Follow, Following, Others};
+pub use frame_time::time_s;
 pub use fuse_step::{
     AllViewsHypothesis, AllViewsResult, FuseStep, PairResult, PairTables, Support, Views, all_pairs,
 };

@@ -42,6 +42,11 @@ impl<'a> PersonEvidence<'a> {
         })
     }
 
+    /// Returns the displacement of a joint between the instant of the frame and the time of the picture, in pixels.
+    pub(crate) fn since_instant(&self, joint: usize) -> Vector2<f64> {
+        self.since_instant.get(joint).copied().unwrap_or_default()
+    }
+
     /// Moves the evidence to the instant of the frame.
     ///
     /// * `since_instant`: displacement of each joint since the instant.
@@ -67,7 +72,7 @@ impl JointEvidence for PersonEvidence<'_> {
     }
 
     fn add_at(&self, joint: usize, points: &[[f64; 2]], scores: &mut [f64]) {
-        let by = self.since_instant.get(joint).copied().unwrap_or_default();
+        let by = self.since_instant(joint);
         let map = self.maps.map(joint);
         for (score, point) in scores.iter_mut().zip(points) {
             let point = [point[0] + by.x, point[1] + by.y];

@@ -2,21 +2,22 @@
 
 use std::sync::Arc;
 
-use geometry::Triangulated;
+use ::people::Solved;
+use geometry::{TriangulateError, Triangulated};
 use multiview::{
-    FrontEvidence, Sides, SidesFilter, SolvedPerson, SpaceView, ViewPlan, anatomical_evidence,
-    front, front_log_ratio_of, solve_person,
+    FrontEvidence, Sides, SidesFilter, SolvedPerson, SpacePose, SpaceView, ViewPlan,
+    anatomical_evidence, front, front_log_ratio_of, solve_person,
 };
 use nalgebra::{Point2, UnitVector3};
 use posenetwork::PersonMaps;
-use skeleton::SIDES;
+use skeleton::{MIRRORED, SIDES};
 
 use crate::bodies::{Bodies, Body, NoJoint};
 use crate::disagreement::{self, FoundByViews};
 use crate::fused_view::FusedView;
 use crate::motion::Motion;
 use crate::person_evidence::PersonEvidence;
-use crate::placed::{N, PartView, Places, joints_at, of_set, shown_in};
+use crate::placed::{N, PartView, Places, hidden, joints_at, of_set, shown_in};
 use crate::sighting::{Sighting, ViewSightings};
 use crate::skeleton_step::{Kept, Skeleton};
 use crate::space_settings::SpaceStepSettings;
@@ -60,10 +61,10 @@ pub(crate) struct PersonStep {
 }
 
 /// A person as one view of the frame shows them.
-struct Shown<'a> {
-    view: usize,
+pub(crate) struct Shown<'a> {
+    pub(crate) view: usize,
     front: FrontEvidence,
-    evidence: PersonEvidence<'a>,
+    pub(crate) evidence: PersonEvidence<'a>,
 }
 
 /// A solution, and the decision about its left and right.
@@ -97,20 +98,59 @@ impl PersonStep {
     /// * Returns a skeleton without joints if fewer than two views show the person. For example, false detections in an empty room do not
     ///   agree between views.
     pub(crate) fn run(&mut self, frame: &FrameViews<'_, '_>, nth: usize) -> Skeleton {
+        let shown = self.shown(frame, nth);
+        let rig = Arc::clone(&self.rig);
+        let solution = self.solve(&rig.plans, &shown);
+        let solution = solution.as_ref();
+        let (places, views) = match solution {
+            Some(solution) => (solution.places, &solution.views[..]),
+            None => ([None; N], &[][..]),
+        };
+        let joints = joints_at(&places, views, &rig.settings.maps);
+        self.finish(frame, solution, joints)
+    }
+
+    /// Completes the person of a frame from joints that were solved from keypoints.
+    ///
+    /// * `shown`: the person in each view that shows the person.
+    pub(crate) fn complete(
+        &mut self,
+        frame: &FrameViews<'_, '_>,
+        (shown, solved): (&[Shown<'_>], &Solved),
+    ) -> Skeleton {
+        let rig = Arc::clone(&self.rig);
+        let solution = self.from_keypoints(&rig.plans, shown, solved);
+        let Some(solution) = &solution else {
+            let nothing = joints_at(&[None; N], &[], &rig.settings.maps);
+            return self.finish(frame, None, nothing);
+        };
+        let mut joints = joints_at(&solution.places, &solution.views, &rig.settings.maps);
+        let exchanged = solution.sides.is_some_and(|sides| sides.exchange);
+        for (nth, joint) in joints.iter_mut().enumerate() {
+            let own = if exchanged { MIRRORED[nth] } else { nth };
+            if matches!(joint, Err(TriangulateError::TooFewViews { .. }))
+                && let Some(placed) = hidden(solved, own)
+            {
+                *joint = Ok(placed);
+            }
+        }
+        self.finish(frame, Some(solution), joints)
+    }
+
+    /// Removes impossible joints, and computes residuals and views.
+    fn finish(
+        &mut self,
+        frame: &FrameViews<'_, '_>,
+        solution: Option<&Solution<'_>>,
+        joints: Vec<Result<Triangulated, TriangulateError>>,
+    ) -> Skeleton {
         let FrameViews {
             answers, people, ..
         } = *frame;
-        let shown = self.shown(frame, nth);
         let rig = Arc::clone(&self.rig);
         let Rig {
             plans, settings, ..
         } = &*rig;
-        let solution = self.solve(plans, &shown);
-        let solution = solution.as_ref();
-        let joints = match solution {
-            Some(it) => joints_at(&it.places, &it.views, &settings.maps),
-            None => joints_at(&[None; N], &[], &settings.maps),
-        };
         let of_set = of_set(settings.joints, &joints);
         let settled = self.bodies.settle(&settings.body, &joints, (settings.joints, of_set));
         let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
@@ -139,7 +179,7 @@ impl PersonStep {
     }
 
     /// Returns the views with a candidate that shows the person, at the instant of the frame.
-    fn shown<'a>(&mut self, frame: &FrameViews<'_, 'a>, nth: usize) -> Vec<Shown<'a>> {
+    pub(crate) fn shown<'a>(&mut self, frame: &FrameViews<'_, 'a>, nth: usize) -> Vec<Shown<'a>> {
         let FrameViews {
             answers,
             evidence,
@@ -179,19 +219,38 @@ impl PersonStep {
         shown
     }
 
+    /// Returns the solution from keypoints; `None` if fewer than two views show it.
+    fn from_keypoints<'a>(
+        &mut self,
+        plans: &'a [Arc<ViewPlan>],
+        shown: &'a [Shown<'_>],
+        solved: &Solved,
+    ) -> Option<Solution<'a>> {
+        let found = SolvedPerson {
+            pose: SpacePose {
+                joints: solved.joints,
+                energy: 0.0,
+            },
+            views: vec![Some([false; 2]); shown.len()],
+        };
+        let views = shown.iter().map(|shown| PartView {
+            view: shown.view,
+            shown: space_view(plans, shown),
+            window_px: shown.evidence.window_px,
+        });
+        let views = views.filter(|part| self.shows(&found, part));
+        let views: Vec<PartView<'a>> = views.collect();
+        (views.len() >= 2).then(|| self.with_sides(&found, views))
+    }
+
     /// Solves for the person; `None` if fewer than two views see the person clearly.
     fn solve<'a>(
         &mut self,
         plans: &'a [Arc<ViewPlan>],
         shown: &'a [Shown<'_>],
     ) -> Option<Solution<'a>> {
-        let views = shown.iter().map(|shown| SpaceView {
-            camera: plans[shown.view].camera(),
-            evidence: &shown.evidence,
-            exchanged: [false; 2],
-            front: shown.front,
-        });
-        let views: Vec<SpaceView<'a>> = views.collect();
+        let views: Vec<SpaceView<'a>> =
+            shown.iter().map(|shown| space_view(plans, shown)).collect();
         if views.len() < 2 {
             return None;
         }
@@ -301,6 +360,15 @@ impl PersonStep {
             });
         }
         views
+    }
+}
+
+fn space_view<'a>(plans: &'a [Arc<ViewPlan>], shown: &'a Shown<'_>) -> SpaceView<'a> {
+    SpaceView {
+        camera: plans[shown.view].camera(),
+        evidence: &shown.evidence,
+        exchanged: [false; 2],
+        front: shown.front,
     }
 }
 

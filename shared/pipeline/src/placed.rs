@@ -1,5 +1,6 @@
 //! Converts a person solved in 3D to the joints and views of a result.
 
+use ::people::Solved;
 use geometry::{MAX_VIEWS, TriangulateError, Triangulated};
 use multiview::{FusedPose, SpaceView, ViewPlan};
 use nalgebra::{Matrix3, Point3};
@@ -75,6 +76,23 @@ pub(crate) fn joints_at(
         })
     };
     places.iter().enumerate().map(joint).collect()
+}
+
+/// A joint that fewer than two views show is left out if its standard deviation along any direction is larger, in metres. The result would
+/// say as much about it as [`crate::disagreement`] says about a joint on which no two views agree.
+const MOST_SD_M: f64 = 0.3;
+
+/// Returns a joint that fewer than two views show, as solved from keypoints; `None` if its position is too uncertain.
+pub(crate) fn hidden(solved: &Solved, joint: usize) -> Option<Triangulated> {
+    let covariance = solved.covariances[joint]?;
+    let widest = covariance.symmetric_eigenvalues().max();
+    (widest <= MOST_SD_M * MOST_SD_M).then_some(Triangulated {
+        in_world: solved.joints[joint]?,
+        covariance,
+        reprojection_px: 0.0,
+        views_used: 0,
+        residuals_px: [f64::NAN; MAX_VIEWS],
+    })
 }
 
 /// Returns the joints of another joint set: each is the mean of the joints of `skeleton::PARSE14` that have the same parts.

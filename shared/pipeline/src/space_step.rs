@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use ::people::{Solved, Solver};
 use multiview::ViewPlan;
 use nalgebra::UnitVector3;
-use posenetwork::PersonMaps;
+use posenetwork::{MapKind, PersonMaps};
 use rayon::prelude::*;
 
-use crate::person_step::{FrameViews, PersonStep, Rig};
+use crate::by_keypoints;
+use crate::frame_time::time_s;
+use crate::person_step::{FrameViews, PersonStep, Rig, Shown};
 use crate::sighting::ViewSightings;
 use crate::skeleton_step::Skeleton;
 use crate::space_settings::SpaceStepSettings;
@@ -39,6 +42,8 @@ struct Remembered {
 pub struct SpaceStep {
     rig: Arc<Rig>,
     people: Vec<Remembered>,
+    /// The solver for people whose joints were found by other programs.
+    solver: Solver,
     n_frames: u64,
     instant_s: Option<f64>,
 }
@@ -52,7 +57,9 @@ impl SpaceStep {
         up_in_world: Option<UnitVector3<f64>>,
         settings: SpaceStepSettings,
     ) -> Self {
+        let cameras = plans.iter().map(|plan| plan.camera().clone()).collect();
         Self {
+            solver: Solver::new(cameras),
             rig: Arc::new(Rig {
                 plans,
                 up_in_world,
@@ -92,11 +99,22 @@ impl SpaceStep {
         for person in &people.people {
             self.remember(person.id);
         }
+        let nth_of = |id: u64| people.people.iter().position(|person| person.id == id);
         let instant_s = self.instant_s;
-        let solve = |known: &mut Remembered| {
-            let nth = people.people.iter().position(|person| person.id == known.id)?;
+        for known in self.people.iter_mut().filter(|known| nth_of(known.id).is_some()) {
             known.step.begin(instant_s);
-            let skeleton = known.step.run(&frame, nth);
+        }
+        let mut kinds = evidence.iter().flatten().map(|maps| maps.grid().kind);
+        let given = kinds.all(|kind| kind == MapKind::Peaks).then(|| self.by_keypoints(&frame));
+        let solve = |known: &mut Remembered| {
+            let nth = nth_of(known.id)?;
+            let skeleton = match &given {
+                Some((shown, solved)) => {
+                    let given = (&shown[nth][..], solved.get(nth)?);
+                    known.step.complete(&frame, given)
+                }
+                None => known.step.run(&frame, nth),
+            };
             Some((
                 nth,
                 PersonSkeleton {
@@ -113,6 +131,22 @@ impl SpaceStep {
         };
         solved.sort_by_key(|(nth, _)| *nth);
         solved.into_iter().map(|(_, person)| person).collect()
+    }
+
+    /// Solves for the joints of all people from their keypoints. Returns, for each person, the views that show the person, and the joints.
+    fn by_keypoints<'a>(
+        &mut self,
+        frame: &FrameViews<'_, 'a>,
+    ) -> (Vec<Vec<Shown<'a>>>, Vec<Solved>) {
+        let people = frame.people.people.iter().enumerate();
+        let shown = people.map(|(nth, person)| {
+            let known = self.people.iter_mut().find(|known| known.id == person.id);
+            known.map_or_else(Vec::new, |known| known.step.shown(frame, nth))
+        });
+        let shown: Vec<Vec<Shown<'a>>> = shown.collect();
+        let time_s = self.instant_s.unwrap_or_else(|| time_s(self.n_frames, None));
+        let solved = by_keypoints::solve(&mut self.solver, time_s, frame, &shown);
+        (shown, solved)
     }
 
     /// Notes that a person is in the frame; creates the step of a new person.

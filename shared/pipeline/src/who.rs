@@ -182,7 +182,7 @@ fn longer_px(sighting: &Sighting) -> f64 {
 }
 
 /// Converts the sightings of a view to detections with their standard deviations.
-fn view(seen: Option<&ViewSightings>) -> View {
+pub(crate) fn view(seen: Option<&ViewSightings>) -> View {
     let detection = |sighting: &Sighting| {
         let window_px = WINDOW * longer_px(sighting);
         let moved_px = SPEED * longer_px(sighting) * f64::from(sighting.age_s);
