@@ -1,5 +1,6 @@
 //! Evaluation with several people: computes identities and positions from given detections, and compares them with the ground truth.
 
+mod as_run;
 mod everybody;
 mod judge;
 mod report;
@@ -9,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use people::{Person, Settings, Solver, Tracker};
 
+pub use as_run::as_run;
 pub use everybody::{Everybody, everybody};
 pub use judge::{Put, Score};
 pub use report::{ActorReport, Measured, Report};
@@ -28,7 +30,8 @@ pub struct Run {
     pub association: Vec<Duration>,
 }
 
-/// Follows the people of a set and computes their joints, frame by frame, without using later frames.
+/// Follows the people of a set and computes their joints, frame by frame, without using later frames. It uses all keypoints of the detector,
+/// as the programs to which it is compared.
 pub fn run(set: &Shelf) -> Run {
     let settings = Settings {
         max: 8,
@@ -45,7 +48,10 @@ pub fn run(set: &Shelf) -> Run {
         let n_views = |person: &Person| person.detections.iter().flatten().count();
         people.retain(|person| n_views(person) >= LEAST_VIEWS);
         let solved = solver.step(time_s, &people, frame);
-        let put = solved.iter().map(|person| Put::new(person.id, &person.joints));
+        let put = solved.iter().map(|person| {
+            let refined = skeleton::body::refine(&person.joints, &person.covariances, None);
+            Put::new(person.id, &refined.joints)
+        });
         run.score.add(truth, &put.collect::<Vec<Put>>());
     }
     run

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use lab::several::{
-    ActorReport, Everybody, Measured, Report, Shelf, ShelfError, everybody, run as follow,
+    ActorReport, Everybody, Measured, Report, Shelf, ShelfError, as_run, everybody, run as follow,
 };
 use runfiles::FrameLine;
 use scene::truth::{Frame, Header, TruthError};
@@ -13,6 +13,16 @@ use serde::Serialize;
 use terminal::output;
 
 use super::Arguments;
+
+/// The report of a set.
+#[derive(Debug, Serialize)]
+struct Both {
+    /// With all keypoints of the detector.
+    #[serde(flatten)]
+    report: Report,
+    /// With the steps of `parallax run`.
+    as_run: Report,
+}
 
 /// Runs the evaluation.
 pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Failure> {
@@ -24,10 +34,21 @@ pub(super) fn run(arguments: &Arguments, folder: &Path) -> Result<ExitCode, Fail
         Failure::new(kind, error)
     })?;
     let views = chosen(&arguments.views, set.cameras.len())?;
-    let report = Report::new(&follow(&set.with_views(&views)), &views);
-    leave(arguments, &report, &in_lines(&report))?;
+    let set = set.with_views(&views);
+    let model = inputs::model_or_shipped(arguments.model.as_deref())?;
+    let as_run = as_run(&set, &model).or_fail(ExitKind::Input)?;
+    let both = Both {
+        report: Report::new(&follow(&set), &views),
+        as_run: Report::new(&as_run, &views),
+    };
+    let lines = format!(
+        "{}\nas `parallax run` solves the same people from keypoint files, without the keypoints that belong to nobody:\n{}",
+        in_lines(&both.report),
+        in_lines(&both.as_run)
+    );
+    leave(arguments, &both, &lines)?;
     failure::require_results(
-        !report.actors.is_empty(),
+        !both.report.actors.is_empty(),
         "the truth has no person in any frame",
     )
 }
