@@ -10,6 +10,8 @@ import parallax_client
 
 
 def main():
+    if sys.argv[1:2] in (["-h"], ["--help"]):
+        return print(__doc__)
     name = sys.argv[1] if len(sys.argv) > 1 else "demo"
     joint = sys.argv[2] if len(sys.argv) > 2 else "right wrist"
     n, missed, longest, last = 0, 0, 0.0, None

@@ -107,7 +107,7 @@ impl PersonStep {
             None => ([None; N], &[][..]),
         };
         let joints = joints_at(&places, views, &rig.settings.maps);
-        self.finish(frame, solution, joints)
+        self.finish(frame, solution, &joints)
     }
 
     /// Completes the person of a frame from joints that were solved from keypoints.
@@ -119,10 +119,10 @@ impl PersonStep {
         (shown, solved): (&[Shown<'_>], &Solved),
     ) -> Skeleton {
         let rig = Arc::clone(&self.rig);
-        let solution = self.from_keypoints(&rig.plans, shown, solved);
+        let solution = self.solution_by_keypoints(&rig.plans, shown, solved);
         let Some(solution) = &solution else {
             let nothing = joints_at(&[None; N], &[], &rig.settings.maps);
-            return self.finish(frame, None, nothing);
+            return self.finish(frame, None, &nothing);
         };
         let mut joints = joints_at(&solution.places, &solution.views, &rig.settings.maps);
         let exchanged = solution.sides.is_some_and(|sides| sides.exchange);
@@ -134,7 +134,7 @@ impl PersonStep {
                 *joint = Ok(placed);
             }
         }
-        self.finish(frame, Some(solution), joints)
+        self.finish(frame, Some(solution), &joints)
     }
 
     /// Removes impossible joints, and computes residuals and views.
@@ -142,7 +142,7 @@ impl PersonStep {
         &mut self,
         frame: &FrameViews<'_, '_>,
         solution: Option<&Solution<'_>>,
-        joints: Vec<Result<Triangulated, TriangulateError>>,
+        joints: &[Result<Triangulated, TriangulateError>],
     ) -> Skeleton {
         let FrameViews {
             answers, people, ..
@@ -151,8 +151,8 @@ impl PersonStep {
         let Rig {
             plans, settings, ..
         } = &*rig;
-        let of_set = of_set(settings.joints, &joints);
-        let settled = self.bodies.settle(&settings.body, &joints, (settings.joints, of_set));
+        let of_set = of_set(settings.joints, joints);
+        let settled = self.bodies.settle(&settings.body, joints, (settings.joints, of_set));
         let (mut settled, body): (Vec<Result<Triangulated, NoJoint>>, Option<Body>) = settled;
         let takes_part = |view: usize| {
             solution.is_some_and(|solution| solution.views.iter().any(|part| part.view == view))
@@ -220,7 +220,7 @@ impl PersonStep {
     }
 
     /// Returns the solution from keypoints; `None` if fewer than two views show it.
-    fn from_keypoints<'a>(
+    fn solution_by_keypoints<'a>(
         &mut self,
         plans: &'a [Arc<ViewPlan>],
         shown: &'a [Shown<'_>],

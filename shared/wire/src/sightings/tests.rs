@@ -137,27 +137,7 @@ fn impossible_numbers_of_a_view_are_refused() {
         message.joints[0][5][1] = wrong;
         sightings_from_message(&message, 0).unwrap_err();
     }
-    let grid = MapGrid {
-        kind: MapKind::Cells,
-        first_px: [0.0; 2],
-        cell_px: [2.0; 2],
-        size: [3, 2],
-    };
-    let of_peaks = MapGrid {
-        kind: MapKind::Peaks,
-        ..grid
-    };
-    let message = maps_to_message(&[of_peaks], [64, 48]).unwrap();
-    let values = [3.0, 4.0, 0.5, 1.0].repeat(14);
-    maps_from_message(&message, &values).unwrap();
-    for (nth, wrong) in [(3, 0.0), (3, -1.0), (2, f32::NAN), (0, f32::INFINITY)] {
-        let mut values = values.clone();
-        values[4 * 5 + nth] = wrong;
-        maps_from_message(&message, &values).unwrap_err();
-    }
-    let mut message = message;
-    message.people[0].kind = 2;
-    maps_from_message(&message, &values).unwrap_err();
+    let grid = small_grid(MapKind::Cells);
     let sent = maps_to_message(&[grid], [64, 48]).unwrap();
     let mut values = vec![-1.0; grid.n_values()];
     maps_from_message(&sent, &values).unwrap();
@@ -171,4 +151,28 @@ fn impossible_numbers_of_a_view_are_refused() {
     let mut message = sent;
     message.people[0].cell_px[1] = 0.0;
     maps_from_message(&message, &[]).unwrap_err();
+}
+
+fn small_grid(kind: MapKind) -> MapGrid {
+    MapGrid {
+        kind,
+        first_px: [0.0; 2],
+        cell_px: [2.0; 2],
+        size: [3, 2],
+    }
+}
+
+#[test]
+fn impossible_peaks_of_keypoints_are_refused() {
+    let grid = small_grid(MapKind::Peaks);
+    let mut message = maps_to_message(&[grid], [64, 48]).unwrap();
+    let values = [3.0, 4.0, 0.5, 1.0].repeat(14);
+    maps_from_message(&message, &values).unwrap();
+    for (nth, wrong) in [(3, 0.0), (3, -1.0), (2, f32::NAN), (0, f32::INFINITY)] {
+        let mut values = values.clone();
+        values[4 * 5 + nth] = wrong;
+        maps_from_message(&message, &values).unwrap_err();
+    }
+    message.people[0].kind = 2;
+    maps_from_message(&message, &values).unwrap_err();
 }
