@@ -256,9 +256,9 @@ const FACES: [(&[&str], f64, f64); 8] = [
 /// Returns the rules that compute every joint of `skeleton::PARSE14` from keypoints, best first. A joint that cannot be computed from the
 /// keypoints has no rules.
 ///
-/// A keypoint with the joint's name is used as the joint (`head` or `head top` as the top of the head). The neck can also be computed as the middle of the shoulders. The top of the head
-/// can also be computed from a part of the face: it lies on the line from the neck through the middle of eyes and ears, at 1.6 times the
-/// distance to that middle.
+/// A keypoint with the joint's name is used as the joint (`head` or `head top` as the top of the head). The neck can also be computed as
+/// the middle of the shoulders. The top of the head can also be computed from a part of the face: it lies on the line from the neck through
+/// the middle of eyes and ears, at 1.6 times the distance to that middle.
 pub fn joint_ways(names: &[String]) -> Vec<Vec<Way>> {
     let find = |name: &str| names.iter().position(|known| known == name);
     let mean = |wanted: &[&str]| -> Option<Vec<(usize, f64)>> {

@@ -14,7 +14,7 @@ use crate::person_maps::{MapGrid, MapKind, Peak, PersonMaps};
 pub(crate) const N_JOINTS: usize = PARSE14.joints.len();
 
 /// Heat below which [`MapSettings::of_heat`] counts it as zero.
-pub(crate) const LEAST_HEAT: f64 = 1e-5;
+const LEAST_HEAT: f64 = 1e-5;
 
 /// Conversion of a map to evidence: `ln(max(h, 0) + eps)`, where `h` is the heat from 0 to 1.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -264,8 +264,9 @@ impl PeakInPicture {
 }
 
 impl JointMap<'_> {
-    /// The evidence for the joint at a point of the picture, in pixels. It is interpolated between sixteen cells (Catmull & Rom 1974), so
-    /// that a maximum may be between two cells. Outside the maps, the evidence is the floor.
+    /// The evidence for the joint at a point of the picture, in pixels. Cells are interpolated, sixteen at a time (Catmull & Rom 1974), so
+    /// that a maximum may be between two cells. The evidence of a peak is the logarithm of its Gaussian, and at least the floor. Outside the
+    /// maps, the evidence is the floor.
     pub fn at(&self, point: [f64; 2]) -> f32 {
         match &self.content {
             Content::Cells(cells) => {
