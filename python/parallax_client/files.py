@@ -68,7 +68,7 @@ class Run:
     status      "ok" if there is a skeleton, otherwise the reason for its absence or "no result", [frame]
     reason      reason for a missing result, [frame]
     joints      names of the joints
-    people      all people (`Person`) by identity
+    people      all people (`Person`) by identity who have a position in any frame
     followed    a `Person` with the data of the followed person in each frame; the followed person can change
     summary     contents of summary.json
 
@@ -90,12 +90,13 @@ class Run:
         self.time_s = np.array([np.nan if it is None else it for it in time], dtype=float)
         self.status = np.array([it["status"] for it in lines], dtype=object)
         self.reason = np.array([it.get("reason") for it in lines], dtype=object)
-        identities = sorted({person["id"] for line in lines for person in line["people"]})
+        identities = sorted({person["id"] for line in lines for person in line["people"] if _has_position(person)})
         self.people = {it: Person(it, self.joints, len(lines)) for it in identities}
         self.followed = Person(None, self.joints, len(lines))
         for row, line in enumerate(lines):
             for person in line["people"]:
-                self.people[person["id"]]._put(row, person)
+                if person["id"] in self.people:
+                    self.people[person["id"]]._put(row, person)
             for person in line["people"][:1]:
                 self.followed._put(row, person)
         self._is_one = all(len(line["people"]) < 2 for line in lines)
@@ -164,6 +165,10 @@ class Run:
                     raise ClientError(f"{path}, line {nth}: {problem}")
                 lines.append(line)
         return lines
+
+
+def _has_position(person):
+    return any("position_m" in joint for joint in person["joints"].values())
 
 
 def _json(where, text):

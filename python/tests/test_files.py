@@ -69,6 +69,14 @@ def test_what_is_wrong_with_a_folder_is_said(tmp_path):
         read_folder(tmp_path)
 
 
+def test_people_who_were_never_located_are_left_out(tmp_path):
+    path = folder(tmp_path, more=[4]) / "pose3d.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    lines[2]["people"].append({"id": 9, "status": "too few views", "joints": {"head": {"status": "too few views"}}})
+    path.write_text("".join(json.dumps(it) + "\n" for it in lines))
+    assert list(read_folder(tmp_path).people) == [1, 4]
+
+
 def test_each_of_several_people_has_arrays_of_its_own(tmp_path):
     run = read_folder(folder(tmp_path, more=[4]))
     assert list(run.people) == [1, 4]

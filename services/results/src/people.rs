@@ -157,7 +157,7 @@ impl Counted {
         People {
             each: each.into_values().collect(),
             follow: self.follow.name().to_owned(),
-            followed: self.ids.len() as u64,
+            followed: self.ids.iter().copied().collect(),
             frames_with_others: self.n_with_others,
             most: self.most,
         }
@@ -185,7 +185,7 @@ mod tests {
         let expected = People {
             each: Vec::new(),
             follow: "largest".to_owned(),
-            followed: 2,
+            followed: vec![4, 5],
             frames_with_others: 2,
             most: 3,
         };

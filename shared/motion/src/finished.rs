@@ -63,7 +63,7 @@ pub fn run(request: &Request, console: &dyn Console) -> Result<Outcome, Failure>
     let motions = motions?;
     let up = request.up.or_else(|| folder::up(&request.folder));
     let mut report = report(&run, &motions, &request.settings);
-    report.doubts = doubts(&run, &report);
+    report.doubts = doubts(run.cut.as_deref(), &report);
     console.begin("", "writing");
     write::all(&request.folder, &run, &motions, &report, up)?;
     console.finish();
@@ -157,13 +157,16 @@ fn person_report(person: &Person, frames: &[u64], found: &Report) -> SmoothedPer
 }
 
 /// Returns the reasons to doubt the result. If there are several people, each reason names the person.
-fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
+fn doubts(cut: Option<&str>, report: &SmoothReport) -> Vec<String> {
     let mut doubts = Vec::new();
-    doubts.extend(run.cut.clone());
-    if report.people.is_empty() {
+    doubts.extend(cut.map(str::to_owned));
+    // People whom the run only expected, and never located, have nothing that could be wrong.
+    let measured: Vec<&SmoothedPerson> =
+        report.people.iter().filter(|person| n_measured(person) > 0).collect();
+    if measured.is_empty() {
         doubts.push(NOTHING_MEASURED.to_owned());
     }
-    for person in &report.people {
+    for person in measured {
         let own = doubts_of(person, report.n_frames as usize).into_iter();
         if report.people.len() == 1 {
             doubts.extend(own);
@@ -174,14 +177,16 @@ fn doubts(run: &Run, report: &SmoothReport) -> Vec<String> {
     doubts
 }
 
+/// Returns the number of measured positions of a person.
+fn n_measured(person: &SmoothedPerson) -> usize {
+    person.joints.values().map(|joint| joint.measured + joint.exchanged).sum()
+}
+
 fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
     let mut doubts = Vec::new();
-    let sum = |of: fn(&SmoothedJoint) -> usize| person.joints.values().map(of).sum::<usize>();
-    let n_measured = sum(|joint| joint.measured) + sum(|joint| joint.exchanged);
-    let n_rejected = sum(|joint| joint.rejected);
-    if n_measured == 0 {
-        doubts.push(NOTHING_MEASURED.to_owned());
-    } else if n_rejected * 5 > n_measured {
+    let n_measured = n_measured(person);
+    let n_rejected: usize = person.joints.values().map(|joint| joint.rejected).sum();
+    if n_rejected * 5 > n_measured {
         doubts.push(format!(
             "{n_rejected} measurements contradict the measurements before and after them, and only {n_measured} do not: check the \
              measurements first"
@@ -214,4 +219,45 @@ pub fn totals(report: &SmoothReport) -> BTreeMap<&'static str, usize> {
         ("absent", sum(|joint| joint.absent)),
     ]
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn people_who_were_never_located_are_no_reason_for_doubt_unless_nobody_was() {
+        let person = |id: u64, measured: usize, rejected: usize| SmoothedPerson {
+            ids: vec![id],
+            joints: [(
+                "neck".to_owned(),
+                SmoothedJoint {
+                    measured,
+                    rejected,
+                    ..SmoothedJoint::default()
+                },
+            )]
+            .into(),
+            ..SmoothedPerson::default()
+        };
+        let doubts = |people: &[SmoothedPerson]| {
+            let report = SmoothReport {
+                n_frames: 10,
+                people: people.to_vec(),
+                ..SmoothReport::default()
+            };
+            doubts(None, &report)
+        };
+        assert!(doubts(&[person(1, 9, 0), person(3, 0, 0)]).is_empty());
+        assert_eq!(
+            doubts(&[person(1, 0, 0), person(3, 0, 0)]),
+            [NOTHING_MEASURED]
+        );
+        assert_eq!(doubts(&[]), [NOTHING_MEASURED]);
+        let one = doubts(&[person(1, 9, 0), person(3, 5, 4)]);
+        assert!(
+            one.len() == 1 && one[0].starts_with("person [3]: 4 measurements"),
+            "{one:?}"
+        );
+    }
 }

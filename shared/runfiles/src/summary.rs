@@ -8,6 +8,9 @@ use crate::nullable::nullable;
 use crate::read::{parse, to_text};
 use crate::{LatencyReport, Missing, ReadError, Trust, VERSION};
 
+/// Maximum number of ids in a text for users.
+const MOST_IDS: usize = 8;
+
 /// The file `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunSummary {
@@ -103,8 +106,8 @@ pub struct People {
     pub each: Vec<PersonSummary>,
     /// Rule that selects the followed person: `last`, `largest` or `clearest`.
     pub follow: String,
-    /// Number of different people who were followed, one after the other.
-    pub followed: u64,
+    /// Ids of the people who were followed, in ascending order.
+    pub followed: Vec<u64>,
     /// Number of results with more than one person.
     pub frames_with_others: u64,
     /// Maximum number of people in one result.
@@ -121,19 +124,35 @@ impl People {
             frames_with_others,
             most,
         } = self;
-        let followed = if *followed > 1 {
-            format!("; {followed} people were followed, one after the other")
-        } else {
-            String::new()
-        };
         if *frames_with_others == 0 {
-            return format!("no other people in view{followed}");
+            return match followed.len() {
+                0 | 1 => "no other people in view".to_owned(),
+                n => format!(
+                    "no other people in view; {n} people were followed, {}",
+                    ids(followed)
+                ),
+            };
         }
+        let followed = match &followed[..] {
+            [] => String::new(),
+            [one] => format!(": id {one}"),
+            several => format!("; in turn, these were {}", ids(several)),
+        };
         format!(
             "up to {most} people in view, and more than one person in {frames_with_others} frames; person.follow = \"{follow}\" selects \
              the followed person{followed}"
         )
     }
+}
+
+/// Returns a list of ids for users.
+fn ids(all: &[u64]) -> String {
+    let shown: Vec<String> = all.iter().take(MOST_IDS).map(u64::to_string).collect();
+    let more = match all.len().saturating_sub(MOST_IDS) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    format!("ids {}{more}", shown.join(", "))
 }
 
 /// One person over the whole run.
@@ -257,5 +276,35 @@ impl RunSummary {
     /// Never fails for this type. The error type is that of `serde_json`.
     pub fn to_text(&self) -> Result<String, serde_json::Error> {
         to_text(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_text_about_people_names_the_followed_ones() {
+        let people = |followed: &[u64], frames_with_others: u64| {
+            let people = People {
+                each: Vec::new(),
+                follow: "last".to_owned(),
+                followed: followed.to_vec(),
+                frames_with_others,
+                most: 3,
+            };
+            people.text()
+        };
+        assert_eq!(people(&[2], 0), "no other people in view");
+        let expected = "no other people in view; 2 people were followed, ids 2, 5";
+        assert_eq!(people(&[2, 5], 0), expected);
+        let ends = |followed: &[u64], end: &str| people(followed, 7).ends_with(end);
+        assert!(ends(&[], "selects the followed person"));
+        assert!(ends(&[2], "selects the followed person: id 2"));
+        let many: Vec<u64> = (1..=10).collect();
+        assert!(ends(
+            &many,
+            "; in turn, these were ids 1, 2, 3, 4, 5, 6, 7, 8 and 2 more"
+        ));
     }
 }
