@@ -97,6 +97,28 @@ fn people_who_swap_places_unseen_keep_their_ids_by_their_colours() {
 }
 
 #[test]
+fn a_person_does_not_jump_to_another_one_on_whom_two_views_agree() {
+    let cameras = ring(4);
+    let mut random = Rng::with_seed(3);
+    let mut tracker = Tracker::new(cameras.clone(), settings());
+    let actor = |along: f64| Actor {
+        at: [along * 0.3_f64.cos(), along * 0.3_f64.sin()],
+        turn: 1.0,
+        stature: 1.7,
+    };
+    for nth in 0..20 {
+        let views = seen(&cameras, &[actor(0.0)], 1.0, &mut random);
+        tracker.step(f64::from(nth) / RATE_HZ, &views);
+    }
+    // The other person is between two opposite cameras, so their rays pass close to the first person.
+    let mut views = seen(&cameras, &[actor(0.8)], 1.0, &mut random);
+    (views[1], views[3]) = (View::default(), View::default());
+    let people = tracker.step(20.0 / RATE_HZ, &views);
+    let neck = people[0].joints[12].unwrap();
+    assert!(people[0].id == 1 && neck.x.hypot(neck.y) < 0.3, "{neck}");
+}
+
+#[test]
 fn a_person_in_another_light_keeps_the_id() {
     let cameras = ring(3);
     let mut random = Rng::with_seed(2);

@@ -224,12 +224,23 @@ impl Tracker {
 
     /// Updates the people for whom detections were assigned.
     fn place(&mut self, now: &Now<'_>, members: Vec<Vec<Member>>, free: &mut [Vec<Place>]) {
-        let &Now { frame, time_s, .. } = now;
+        let &Now {
+            frame,
+            time_s,
+            gap_s,
+            ..
+        } = now;
         let each = self.tracks.iter_mut().zip(members).zip(now.expected);
         for ((track, members), expected) in each {
             let agreed = agree(frame, members, Some(expected));
             give_back(free, &agreed.refused);
             let n = agreed.members.len();
+            // The rays of two views that pass close to this person can meet at another one.
+            let moved = of_people(expected, &agreed.person.joints).filter(|_| n == 2);
+            if moved.is_some_and(|moved| moved > track.reach(time_s, gap_s) + TAKEN_UP_M) {
+                give_back(free, &agreed.members);
+                continue;
+            }
             let is_placed =
                 n >= self.settings.min_views.max(2) && agreed.person.n_core() >= LEAST_SEEN;
             // Rays to two different people can also meet.
