@@ -36,24 +36,37 @@ impl Calibration {
         }
     }
 
-    /// Adds the poses that the views found in a frame, each on its own. A frame with several people is not used, because each view may have
-    /// found another person.
+    /// Adds the poses that the views found in a frame, each on its own. If there are several people, one is used who is not near another
+    /// one; otherwise a view may have found another person. By the paper's method, the candidates of the views are not compared with the
+    /// people, so frames with several people are not used.
     pub(crate) fn add(&mut self, scene: &Scene, record: &FrameRecord) {
-        if record.skeletons.n_seen > 1 {
+        let is_alone = record.skeletons.n_seen <= 1;
+        let person = if is_alone {
+            record.followed()
+        } else {
+            own::apart(record).filter(|_| scene.has_maps)
+        };
+        if !is_alone && person.is_none() {
             return;
         }
         let points: Vec<_> =
-            (0..scene.views.len()).map(|view| parts(scene, record, view)).collect();
+            (0..scene.views.len()).map(|view| parts(scene, record, view, person)).collect();
         // In an empty room, a network's false detections are in different places in different views. Their disagreement does not show that
         // a camera is wrong.
         let is_there = |person: &SkeletonMessage| person.status == Status::OK;
-        if !scene.has_maps || record.followed().is_some_and(is_there) {
+        if !scene.has_maps || person.is_some_and(is_there) {
             self.watch.note(&points);
         }
-        self.swaps.note(&points);
-        self.find_exchanged(scene);
-        self.tell_contradiction(scene);
-        self.follow_steps(scene, record, &points);
+        // If the footage of two cameras was swapped, the candidates nearest to the person are those of other people.
+        if is_alone {
+            self.swaps.note(&points);
+            self.find_exchanged(scene);
+            self.tell_contradiction(scene);
+        }
+        // Delays are estimated from the motion of one person.
+        if person.map(|person| person.id) == record.followed().map(|person| person.id) {
+            self.follow_steps(scene, record, &points);
+        }
         for (view, fit) in self.fits.iter_mut().enumerate() {
             let scale = scene.views[view].source_scale();
             fit.residual_px = self.watch.residual_px(view).map(|value| value * scale);
@@ -177,20 +190,25 @@ impl Calibration {
     }
 }
 
-/// Returns the parts of a view's own best candidate, in pixels of the frame, with left and right as seen by the person. Returns `None` if
-/// the view does not see a person clearly.
-fn parts(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Vec<[f64; 2]>> {
+/// Returns the parts of a view's own candidate for a person, in pixels of the frame, with left and right as seen by the person. Returns
+/// `None` if the view does not see a person clearly.
+fn parts(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+    person: Option<&SkeletonMessage>,
+) -> Option<Vec<[f64; 2]>> {
     let fused = record.fused(view);
     // With maps of networks, fusion leaves out views that contradict the others. These are the views that must be checked, so a view that
     // was left out is not skipped here.
     if fused.is_none() && !scene.has_maps {
         return None;
     }
-    let readings = own::readings(scene, record, view)?;
+    let readings = own::readings(scene, record, view, person)?;
     let is_exchanged = match fused {
         Some(fused) if !scene.has_maps => fused.exchanged == 1,
         // A network may name left and right as seen in the picture. The 3D solution shows which side is the person's left.
-        _ => own::is_exchanged(scene, record, view, &readings),
+        _ => person.is_some_and(|person| own::is_exchanged(scene, person, view, &readings)),
     };
     let [named, exchanged] = readings;
     Some(if is_exchanged { exchanged } else { named })
@@ -220,7 +238,7 @@ mod tests {
         let scene = scene();
         let mut record = record(0);
         record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
-        assert_eq!(parts(&scene, &record, 0), None);
+        assert_eq!(parts(&scene, &record, 0, record.followed()), None);
         let maps = Scene {
             has_maps: true,
             ..scene
@@ -235,24 +253,30 @@ mod tests {
             age_s: 0.0,
         };
         record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
-        assert_eq!(parts(&maps, &record, 0).unwrap().len(), skeleton::N_PARTS);
+        assert_eq!(
+            parts(&maps, &record, 0, record.followed()).unwrap().len(),
+            skeleton::N_PARTS
+        );
         let strict = Scene {
             least_heat: 0.95,
             ..maps
         };
-        assert_eq!(parts(&strict, &record, 0), None);
+        assert_eq!(parts(&strict, &record, 0, record.followed()), None);
     }
 
     #[test]
     fn a_view_without_people_is_not_used_for_the_check() {
         let scene = scene();
         let mut record = record(0);
-        assert_eq!(parts(&scene, &record, 0).unwrap().len(), 1);
+        assert_eq!(
+            parts(&scene, &record, 0, record.followed()).unwrap().len(),
+            1
+        );
         record.skeletons.people[0].views[0].status = Status::NO_DETECTION;
-        assert_eq!(parts(&scene, &record, 0), None);
+        assert_eq!(parts(&scene, &record, 0, record.followed()), None);
         record.views[1].pose = None;
-        assert_eq!(parts(&scene, &record, 1), None);
+        assert_eq!(parts(&scene, &record, 1, record.followed()), None);
         record.skeletons.people[0].n_views = 0;
-        assert_eq!(parts(&scene, &record, 1), None);
+        assert_eq!(parts(&scene, &record, 1, record.followed()), None);
     }
 }

@@ -2,39 +2,94 @@
 
 use geometry::Camera;
 use messages::{Joint3d, SkeletonMessage};
+use nalgebra::{Point3, Vector3};
 
+use crate::frame::Own;
 use crate::overlay::joints_of;
 use crate::pose3d::is_placed;
 use crate::{FrameRecord, Scene};
 
+/// Minimum distance of a person from all others at which the views' candidates for this person can be told from those for others, in metres.
+const APART_M: f64 = 0.8;
 /// Median distance of a view's joints from the result up to which the view counts as showing the same person, in metres.
 const SAME_PERSON_M: f64 = 0.25;
 /// Maximum distance of a joint that is counted, in metres. Larger distances count as this value.
 const MOST_M: f64 = 0.3;
 
-/// Returns the parts of a view's best candidate in pixels of the frame, once with left and right as named by the network or filters, and
+/// Returns the mean distance of a candidate's joints from the projected joints of a person, in pixels of the frame, with left and right as
+/// named or swapped. Returns `None` if they share no joint.
+pub(crate) fn distance_px(
+    scene: &Scene,
+    view: usize,
+    own: &Own,
+    person: &SkeletonMessage,
+) -> Option<f64> {
+    let mirror = scene.model.spec().mirror.as_deref();
+    let swapped: Option<Vec<_>> =
+        mirror.map(|mirror| mirror.iter().map(|part| own.centres_px[*part]).collect());
+    let mean = |parts: &[[f64; 2]]| {
+        let distances = distances(scene, person, view, parts);
+        let sum: f64 = distances.iter().map(|distance| distance[0]).sum();
+        (!distances.is_empty()).then(|| sum / distances.len() as f64)
+    };
+    let [named, swapped] = [
+        mean(&own.centres_px),
+        swapped.and_then(|parts| mean(&parts)),
+    ];
+    named.zip(swapped).map(|(a, b)| a.min(b)).or(named)
+}
+
+/// Returns the person who is farthest from all others; `None` if that person is less than [`APART_M`] from another one.
+pub(crate) fn apart(record: &FrameRecord) -> Option<&SkeletonMessage> {
+    let people: Vec<_> = record
+        .skeletons
+        .listed()
+        .iter()
+        .filter_map(|person| Some((person, centre(person)?)))
+        .collect();
+    let nearest_m = |nth: usize| {
+        let others = people.iter().enumerate().filter(|other| other.0 != nth);
+        let metres = others.map(|(_, other)| (other.1 - people[nth].1).norm());
+        metres.fold(f64::INFINITY, f64::min)
+    };
+    let each = people.iter().enumerate().map(|(nth, (person, _))| (nearest_m(nth), *person));
+    let apart = each.max_by(|a, b| a.0.total_cmp(&b.0));
+    apart.filter(|apart| apart.0 >= APART_M).map(|apart| apart.1)
+}
+
+/// Returns the mean of a person's joints; `None` if none is known.
+fn centre(person: &SkeletonMessage) -> Option<Point3<f64>> {
+    let placed = person.listed_joints().iter().filter(|joint| is_placed(joint));
+    let (n, sum) = placed.fold((0.0, Vector3::zeros()), |(n, sum), joint| {
+        (n + 1.0, sum + Vector3::from(joint.in_world))
+    });
+    (n > 0.0).then(|| Point3::from(sum / n))
+}
+
+/// Returns the parts of a view's candidate for a person in pixels of the frame, once with left and right as named by the network or filters, and
 /// once with left and right swapped. Returns `None` if the view has no candidate, or if its candidate is too uncertain.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,
     view: usize,
+    person: Option<&SkeletonMessage>,
 ) -> Option<[Vec<[f64; 2]>; 2]> {
-    let best = record.own(scene, view).filter(|own| own.is_clear)?;
+    let best = record.candidate(scene, view, person).filter(|own| own.is_clear)?;
     let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
     let exchanged = mirror.map(|mirror| mirror.iter().map(|part| named[*part]).collect());
     Some([named.clone(), exchanged.unwrap_or(named)])
 }
 
-/// Returns true if the parts of a view fit the solution better if left and right are swapped.
+/// Returns true if the parts of a view fit a person better if left and right are swapped.
 pub(crate) fn is_exchanged(
     scene: &Scene,
-    record: &FrameRecord,
+    person: &SkeletonMessage,
     view: usize,
     readings: &[Vec<[f64; 2]>; 2],
 ) -> bool {
     let sum = |parts: &[[f64; 2]]| -> f64 {
-        let distances = distances(scene, record, view, parts);
+        let distances = distances(scene, person, view, parts);
         distances.iter().map(|distance| distance[0]).sum()
     };
     sum(&readings[1]) < sum(&readings[0])
@@ -44,9 +99,10 @@ pub(crate) fn is_exchanged(
 /// and limited to 0.3 each. Only views that show the same person are used or, if there are fewer than two of these, all views.
 pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     let of_view = |view: usize| {
-        let readings = readings(scene, record, view)?;
-        let is_exchanged = is_exchanged(scene, record, view, &readings);
-        let distances = distances(scene, record, view, &readings[usize::from(is_exchanged)]);
+        let person = record.followed()?;
+        let readings = readings(scene, record, view, Some(person))?;
+        let is_exchanged = is_exchanged(scene, person, view, &readings);
+        let distances = distances(scene, person, view, &readings[usize::from(is_exchanged)]);
         let mut metres: Vec<f64> = distances.iter().map(|distance| distance[1]).collect();
         metres.sort_by(f64::total_cmp);
         Some(metres).filter(|metres| !metres.is_empty())
@@ -58,18 +114,17 @@ pub(crate) fn distances_m(scene: &Scene, record: &FrameRecord) -> Vec<f64> {
     counted.flatten().map(|counted| counted.min(MOST_M)).collect()
 }
 
-/// Returns the distances of a view's joints from those of the solution, in pixels of the frame and in metres. Only joints for which both
+/// Returns the distances of a view's joints from those of a person, in pixels of the frame and in metres. Only joints for which both
 /// distances are known are returned.
 fn distances(
     scene: &Scene,
-    record: &FrameRecord,
+    person: &SkeletonMessage,
     view: usize,
     parts: &[[f64; 2]],
 ) -> Vec<[f64; 2]> {
     let camera = scene.views[view].framing.camera();
-    let joints = record.followed().map_or(&[][..], SkeletonMessage::listed_joints);
     let seen = joints_of(scene, parts).unwrap_or_default();
-    let both = joints.iter().zip(&seen);
+    let both = person.listed_joints().iter().zip(&seen);
     both.filter_map(|(joint, seen)| distance(camera, joint, *seen)).collect()
 }
 
@@ -93,9 +148,9 @@ mod tests {
     fn a_view_without_a_candidate_has_no_offset() {
         let scene = scene();
         let mut record = record(0);
-        assert!(readings(&scene, &record, 0).is_some());
+        assert!(readings(&scene, &record, 0, record.followed()).is_some());
         record.views[0].pose = None;
-        assert!(readings(&scene, &record, 0).is_none());
+        assert!(readings(&scene, &record, 0, record.followed()).is_none());
         // The parts of this model are not joints.
         assert_eq!(distances_m(&scene, &record), [0.0; 0]);
     }
@@ -125,6 +180,56 @@ mod tests {
         assert!(distance(camera, &unplaced, [0.0, 0.0]).is_none());
     }
 
+    #[test]
+    fn the_candidate_of_a_person_is_found_among_those_of_others_who_are_apart() {
+        let scene = Scene {
+            has_maps: true,
+            ..scene()
+        };
+        let mut record = record(0);
+        let camera = scene.views[0].framing.camera().clone();
+        let person = |id: u64, x: f64| {
+            let mut person = crate::testing::skeletons(0).people[0];
+            (person.id, person.n_joints) = (id, 14);
+            for joint in &mut person.joints[..14] {
+                joint.in_world = [x, 0.0, 0.0];
+            }
+            person
+        };
+        let seen = |x: f64| {
+            let at = camera.project(&[x, 0.0, 0.0].into()).unwrap();
+            pipeline::Sighting {
+                joints: [Some([at.x as f32, at.y as f32]); 14],
+                heats: [0.9; 14],
+                score: 0.5,
+                front: [0.0; 2],
+                extras: Vec::new(),
+                colour: None,
+                age_s: 0.0,
+            }
+        };
+        let mut set = |xs: [f64; 2], seen_at: &[f64]| {
+            record.skeletons.n_people = 2;
+            record.skeletons.people[..2].copy_from_slice(&[person(1, xs[0]), person(2, xs[1])]);
+            let seen: Vec<_> = seen_at.iter().copied().map(seen).collect();
+            record.views[0].pose = wire::sightings_to_message(&seen, 0, [80, 60]).ok();
+            record.clone()
+        };
+        // The camera was moved: it sees both people 0.2 m to the right.
+        let both = set([-0.5, 0.5], &[0.7, -0.3]);
+        let people = &both.skeletons.people[..2];
+        for (person, x) in people.iter().zip([-0.3, 0.7]) {
+            let own = both.candidate(&scene, 0, Some(person)).unwrap();
+            let at = camera.project(&[x, 0.0, 0.0].into()).unwrap();
+            assert!((own.centres_px[0][0] - at.x).abs() < 1e-3);
+        }
+        assert_eq!(apart(&both).unwrap().id, 2);
+        // The second person is not seen.
+        let one = set([-0.5, 0.5], &[-0.3]);
+        assert!(one.candidate(&scene, 0, Some(&one.skeletons.people[1])).is_none());
+        assert!(apart(&set([-0.2, 0.2], &[0.7, -0.3])).is_none());
+    }
+
     /// A joint set with one joint, which is the only part of the model.
     static ONE: skeleton::JointSet = skeleton::JointSet {
         name: "one",
@@ -144,7 +249,7 @@ mod tests {
         record.views.push(record.views[1].clone());
         record.skeletons.people[0].n_joints = 1;
         // The joint is where every view saw its part, six metres in front of the cameras.
-        let [parts, _] = readings(&scene, &record, 0).unwrap();
+        let [parts, _] = readings(&scene, &record, 0, record.followed()).unwrap();
         let lens = scene.views[0].framing.camera().intrinsics;
         let right = [
             6.0 * (parts[0][0] - lens.cx) / lens.fx,

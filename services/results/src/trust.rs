@@ -22,6 +22,8 @@ const SD_PER_MAD: f64 = 1.4826;
 
 /// Width of a bin of the histogram of body deviations, in standard deviations.
 const STEP: f64 = 0.05;
+/// Width of a bin of the histogram of reprojection errors, as a fraction of the person's height.
+const ERROR_STEP: f64 = 0.001;
 
 /// Collects evidence for and against the results.
 #[derive(Debug, Default)]
@@ -34,8 +36,8 @@ pub(crate) struct Trusted {
     n_joints_implausible: u64,
     /// For each deviation, in units of [`STEP`], the number of bodies with this deviation.
     deviations: BTreeMap<u32, u64>,
-    /// Sum of the squared errors, as fractions of the person's height, and number of errors.
-    squared: (f64, u64),
+    /// For each reprojection error, in units of [`ERROR_STEP`], the number of joints with this error.
+    errors: BTreeMap<u32, u64>,
     /// Sum of the distances of the views' joints from the result, in metres, and number of distances.
     distances: (f64, u64),
     /// For each bone, the number of results by its length, in units of [`LENGTH_STEP_M`].
@@ -112,9 +114,8 @@ impl Trusted {
             if let Some(height_px) = height_px.filter(|_| joint.status == Status::OK)
                 && joint.reprojection_px.is_finite()
             {
-                let share = joint.reprojection_px / height_px;
-                self.squared.0 += share.powi(2);
-                self.squared.1 += 1;
+                let step = (joint.reprojection_px / height_px / ERROR_STEP).round() as u32;
+                *self.errors.entry(step).or_default() += 1;
             }
         }
     }
@@ -154,15 +155,8 @@ impl Trusted {
     /// Returns the verdict so far.
     pub(crate) fn trust(&self) -> Trust {
         let share = |n: u64, of: u64| n as f64 / of.max(1) as f64;
-        let (sum, n) = self.squared;
-        let half = self.deviations.values().sum::<u64>().div_ceil(2);
-        let mut counted = 0;
-        let median = self.deviations.iter().find(|deviation| {
-            counted += deviation.1;
-            counted >= half
-        });
         Trust {
-            body_deviation: median.map(|median| f64::from(*median.0) * STEP),
+            body_deviation: median(&self.deviations).map(|median| f64::from(median) * STEP),
             bone_scatter_m: self.bone_scatter_m(),
             disagreement_m: (self.distances.1 > 0)
                 .then(|| self.distances.0 / self.distances.1 as f64),
@@ -170,10 +164,21 @@ impl Trusted {
             jumps: share(self.n_jumps, self.frames),
             implausible: share(self.n_implausible, self.frames),
             joints_implausible: share(self.n_joints_implausible, self.n_joints),
-            reprojection: (n > 0).then(|| (sum / n as f64).sqrt()),
+            reprojection: median(&self.errors).map(|median| f64::from(median) * ERROR_STEP),
             sides_unsure: share(self.n_unsure, self.n_decided),
         }
     }
+}
+
+/// Returns the median of counted values; `None` if there are none.
+fn median(counts: &BTreeMap<u32, u64>) -> Option<u32> {
+    let half = counts.values().sum::<u64>().div_ceil(2);
+    let mut counted = 0;
+    let median = counts.iter().find(|(_, n)| {
+        counted += *n;
+        counted >= half
+    });
+    median.map(|(value, _)| *value)
 }
 
 fn place(pose: &SkeletonMessage, joint: usize) -> Option<Vector3<f64>> {
@@ -255,6 +260,19 @@ mod tests {
         assert!((got.reprojection.unwrap() - 0.02).abs() < 1e-9);
         assert!((got.body_deviation.unwrap() - 0.8).abs() < 1e-9);
     }
+
+    #[test]
+    fn joints_that_are_hidden_in_some_results_do_not_change_the_reprojection_error() {
+        let mut trusted = Trusted::default();
+        for nth in 0..20 {
+            let mut pose = result(Sides::SURE);
+            pose.joints[0].reprojection_px = if nth % 3 == 0 { 90.0 } else { 6.0 };
+            trusted.add(Some(&pose), &[], (None, &[]));
+        }
+        let got = trusted.trust();
+        assert!((got.reprojection.unwrap() - 0.03).abs() < 1e-9);
+    }
+
     #[test]
     fn bones_that_change_and_a_person_who_jumps_are_counted() {
         let mut trusted = Trusted::default();
