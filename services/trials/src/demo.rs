@@ -52,6 +52,7 @@ impl Options {
         SyntheticSetup {
             subject: self.subject,
             action: self.action,
+            passers: self.people.saturating_sub(1),
             seed: self.seed,
             rate_hz,
             n_frames: self.n_frames(rate_hz),

@@ -29,7 +29,7 @@ result, the cost of the kill, the latency of every stage, the account of all fra
 `parallax run OUT/deployment.toml` runs the deployment again. Files of an earlier demo are replaced.
 
 The demo checks limits that a broken pipeline would exceed. At least --min-results of the frames have a result, at least --min-skeletons of \
-the results have a skeleton, and PCP3D over all results is at least --min-pcp3d. The killed camera is back within --max-return-ms. \
+the results have a skeleton, and PCP3D over all people in all results is at least --min-pcp3d. The killed camera is back within --max-return-ms. \
 Meanwhile there are results from the other cameras, with no pause longer than --max-pause-ms. This is checked only if the camera was away for \
 longer than the interval of results and the deadline of a stage. Every frame of every view is accounted for, except two frames that the killed \
 process may have been processing. No other process fails, and all results are written.
@@ -46,6 +46,7 @@ Examples:
     parallax demo
     parallax demo --seconds 60 --action boxing --subject 4 --out /tmp/boxing
     parallax demo --no-kill --json
+    parallax demo --people 2                two people who pass each other
     parallax demo --seconds 300 --view      watch it in the browser";
 
 /// Options of `parallax demo`.
@@ -70,6 +71,9 @@ pub(crate) struct Arguments {
     /// Number of the person, which determines shape, clothes and style of movement.
     #[arg(long, value_name = "N", default_value_t = 1)]
     subject: u64,
+    /// Number of people. The others walk through the room and pass the person.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=4))]
+    people: u64,
     /// Seed of the motion, the room and the lighting.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -132,6 +136,7 @@ impl Arguments {
             rate_hz: self.rate,
             action: self.action,
             subject: self.subject,
+            people: self.people,
             seed: self.seed,
             deadline_ms: self.deadline_ms,
             kills: !self.no_kill,

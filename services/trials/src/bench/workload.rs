@@ -178,6 +178,7 @@ impl Workload {
         let setup = SyntheticSetup {
             subject: 1,
             action: Action::Walking,
+            passers: 0,
             seed: options.seed,
             rate_hz: options.rate_hz,
             n_frames: n_frames.max(1),
@@ -357,7 +358,7 @@ mod tests {
             frame: 0,
             epoch: 0,
             sent_ms,
-            joints: Vec::new(),
+            people: Vec::new(),
             views: vec![ViewResult {
                 camera: Some(camera),
                 ..ViewResult::default()

@@ -168,7 +168,7 @@ mod tests {
             frame,
             epoch: 0,
             sent_ms,
-            joints: Vec::new(),
+            people: Vec::new(),
             views: vec![ViewResult::default(), second],
         }
     }

@@ -278,7 +278,7 @@ mod tests {
             frame: 1,
             epoch,
             sent_ms,
-            joints: Vec::new(),
+            people: Vec::new(),
             views: Vec::new(),
         };
         let results = [of_life(0, 1000.0), of_life(1, 1750.0), of_life(1, 1900.0)];

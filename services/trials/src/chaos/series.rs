@@ -126,7 +126,7 @@ mod tests {
             frame: 0,
             epoch: 0,
             sent_ms,
-            joints: Vec::new(),
+            people: Vec::new(),
             views: vec![view],
         }
     }

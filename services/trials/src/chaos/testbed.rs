@@ -80,6 +80,7 @@ impl Testbed {
         let setup = SyntheticSetup {
             subject: 1,
             action: Action::Walking,
+            passers: 0,
             seed: options.seed,
             rate_hz: RATE_HZ,
             n_frames: (RATE_HZ * f64::from(options.seconds)) as u64,

@@ -125,7 +125,7 @@ mod tests {
 
     fn score(pcp3d_percent: Option<f64>) -> Score {
         Score {
-            frames: 90,
+            skeletons: 90,
             pcp3d_percent,
             mpjpe_mm: None,
             lost_percent: None,

@@ -20,6 +20,8 @@ pub struct Options {
     pub action: Action,
     /// Number of the person, which determines body shape and clothes.
     pub subject: u64,
+    /// Number of people: the person of `action` and `subject`, and others who cross the room.
+    pub people: u64,
     /// Seed of the motion, the room and the lighting.
     pub seed: u64,
     /// Time that a stage waits for a late view, in milliseconds; by default 500, or more on a slow machine.

@@ -99,13 +99,14 @@ fn marks(cost: Option<&Cost>, clock: &Clock) -> Vec<Mark> {
 }
 
 fn space(run: &Run<'_>, synthetic: &SyntheticDeployment) -> Space {
-    let moment = |(result, truth): (&FrameResult, &Vec<Point>)| exports::report::run::Moment {
-        frame: result.frame,
-        seconds: result.frame as f64 / run.rate_hz,
-        found: result.joints.clone(),
-        truth: truth.clone(),
-        views: result.views.iter().map(|view| view.missing.clone()).collect(),
-    };
+    let moment =
+        |(result, people): (&FrameResult, &Vec<Vec<Point>>)| exports::report::run::Moment {
+            frame: result.frame,
+            seconds: result.frame as f64 / run.rate_hz,
+            found: people.first().map_or_else(Vec::new, |truth| result.nearest(truth)),
+            truth: people.first().cloned().unwrap_or_default(),
+            views: result.views.iter().map(|view| view.missing.clone()).collect(),
+        };
     let up = synthetic.rig.up_in_world();
     Space {
         joints: PARSE14.joints.iter().map(|joint| joint.name.to_owned()).collect(),
@@ -189,8 +190,8 @@ fn accuracy(report: &Report) -> Table {
     let row = |what: &str, cells: Vec<String>| [vec![what.to_owned()], cells].concat();
     let mut rows = vec![
         row(
-            "results",
-            scores().map(|score| score.frames.to_string()).collect(),
+            "skeletons",
+            scores().map(|score| score.skeletons.to_string()).collect(),
         ),
         row(
             "PCP3D, %",
@@ -340,7 +341,7 @@ mod tests {
             frame,
             epoch: 0,
             sent_ms: 0.0,
-            joints: Vec::new(),
+            people: Vec::new(),
             views,
         }
     }

@@ -30,7 +30,10 @@ impl Report {
         let of = |wanted: &dyn Fn(&FrameResult) -> bool| {
             let pairs = run.results.iter().zip(run.truth);
             let selected = pairs.filter(|pair| wanted(pair.0));
-            score(selected.map(|selected| (&selected.0.joints[..], &selected.1[..])))
+            let each = selected.flat_map(|(result, people)| {
+                people.iter().map(|truth| (result.nearest(truth), &truth[..]))
+            });
+            score(each)
         };
         let scores = [
             ("all results", of(&|_| true)),
@@ -116,10 +119,10 @@ impl Report {
         writeln!(text, "\naccuracy against the truth")?;
         for (name, score) in &self.scores {
             if let (Some(pcp3d), Some(mpjpe)) = (score.pcp3d_percent, score.mpjpe_mm) {
-                let frames = score.frames;
+                let skeletons = score.skeletons;
                 writeln!(
                     text,
-                    "  {name:<24} PCP3D {pcp3d:>5.1} %   MPJPE {mpjpe:>4.0} mm   {frames} results"
+                    "  {name:<24} PCP3D {pcp3d:>5.1} %   MPJPE {mpjpe:>4.0} mm   {skeletons} skeletons"
                 )?;
             }
         }

@@ -29,8 +29,8 @@ pub(super) struct Run<'a> {
     pub report: &'a Report,
     /// Results of the run.
     pub results: &'a [FrameResult],
-    /// The true joints of each result in world coordinates, in metres.
-    pub truth: &'a [Vec<Point>],
+    /// The true joints of each person in each result in world coordinates, in metres.
+    pub truth: &'a [Vec<Vec<Point>>],
     /// Times of the kill; `None` if no kill was planned.
     pub killed: Option<FaultTimes>,
     /// The session, which is the time of planning (`failure::now_nanos`).

@@ -5,6 +5,7 @@ use skeleton::PARSE14;
 use statistics::score::{joint_errors, segment_errors, segments};
 
 use crate::trial::Point;
+use crate::trial::results::Joints;
 
 /// The conventional threshold of PCP3D.
 pub(super) const GAMMA: f64 = 0.5;
@@ -12,8 +13,8 @@ pub(super) const GAMMA: f64 = 0.5;
 /// Accuracy of some results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Score {
-    /// Number of results.
-    pub frames: usize,
+    /// Number of true skeletons: results, times the number of people.
+    pub skeletons: usize,
     /// PCP3D: percentage of segments for which the mean error of both ends is at most half of the segment's length. A segment that was not
     /// found counts as wrong. `None` if there are no results.
     pub pcp3d_percent: Option<f64>,
@@ -27,23 +28,23 @@ pub(super) struct Score {
 
 /// Compares results with the truth.
 ///
-/// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each result, in metres.
-pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [Point])>) -> Score {
+/// * `pairs`: the found and the true joints of `skeleton::PARSE14` of each person in each result, in metres.
+pub(super) fn score<T: AsRef<[Point]>>(pairs: impl Iterator<Item = (Joints, T)>) -> Score {
     let segments = segments(&PARSE14).map_or_else(Vec::new, Vec::from);
     // For each segment, the number of results in which it is correct, and the number of all results.
     let mut right = vec![[0_usize; 2]; segments.len()];
-    let (mut distances, mut n_joints, mut frames) = (Vec::new(), 0_usize, 0);
+    let (mut distances, mut n_joints, mut skeletons) = (Vec::new(), 0_usize, 0);
     for (found, truth) in pairs {
-        let truth: Vec<Option<Point>> = truth.iter().copied().map(Some).collect();
-        let errors = segment_errors(&segments, found, &truth);
+        let truth: Vec<Option<Point>> = truth.as_ref().iter().copied().map(Some).collect();
+        let errors = segment_errors(&segments, &found, &truth);
         for (count, error) in right.iter_mut().zip(errors.iter().flatten()) {
             count[0] += usize::from(*error <= GAMMA);
             count[1] += 1;
         }
-        let errors = joint_errors(found, &truth);
+        let errors = joint_errors(&found, &truth);
         n_joints += errors.len();
         distances.extend(errors.into_iter().flatten().filter(|error| error.is_finite()));
-        frames += 1;
+        skeletons += 1;
     }
     let share = |n: usize, of: usize| (of > 0).then(|| 100.0 * n as f64 / of as f64);
     let all = right.iter().fold([0; 2], |sum, counts| {
@@ -51,7 +52,7 @@ pub(super) fn score<'a>(pairs: impl Iterator<Item = (&'a [Option<Point>], &'a [P
     });
     let mean = distances.iter().sum::<f64>() / distances.len() as f64;
     Score {
-        frames,
+        skeletons,
         pcp3d_percent: share(all[0], all[1]),
         mpjpe_mm: (!distances.is_empty()).then_some(1000.0 * mean),
         lost_percent: share(n_joints - distances.len(), n_joints),
@@ -79,13 +80,13 @@ mod tests {
         let far: Vec<Option<Point>> =
             truth.iter().map(|truth| Some([truth[0], 9.0, 0.0])).collect();
         let pair = |found| (found, &truth[..]);
-        let good = score([pair(&found[..])].into_iter());
+        let good = score([pair(found.clone())].into_iter());
         assert_eq!(
-            (good.frames, good.pcp3d_percent, good.mpjpe_mm),
+            (good.skeletons, good.pcp3d_percent, good.mpjpe_mm),
             (1, Some(100.0), Some(0.0))
         );
-        let both = score([pair(&found[..]), pair(&far[..])].into_iter());
-        assert_eq!((both.frames, both.pcp3d_percent), (2, Some(50.0)));
+        let both = score([pair(found), pair(far)].into_iter());
+        assert_eq!((both.skeletons, both.pcp3d_percent), (2, Some(50.0)));
         assert!((both.mpjpe_mm.unwrap() - 4500.0).abs() < 1e-9);
         assert_eq!(both.segments.len(), 12);
     }
@@ -93,16 +94,16 @@ mod tests {
     #[test]
     fn a_missing_joint_is_wrong_but_has_no_distance() {
         let (truth, nothing) = (truth(), vec![None; 14]);
-        let got = score([(&nothing[..], &truth[..])].into_iter());
+        let got = score([(nothing, &truth[..])].into_iter());
         assert_eq!((got.pcp3d_percent, got.mpjpe_mm), (Some(0.0), None));
         assert_eq!(got.lost_percent, Some(100.0));
     }
 
     #[test]
     fn without_results_there_are_no_numbers() {
-        let got = score(core::iter::empty());
+        let got = score(core::iter::empty::<(_, Vec<Point>)>());
         assert_eq!(
-            (got.frames, got.pcp3d_percent, got.lost_percent),
+            (got.skeletons, got.pcp3d_percent, got.lost_percent),
             (0, None, None)
         );
     }

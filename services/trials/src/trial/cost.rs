@@ -149,7 +149,7 @@ mod tests {
             frame,
             epoch: epoch.unwrap_or(0),
             sent_ms,
-            joints: vec![Some([0.0; 3]); 14],
+            people: vec![vec![Some([0.0; 3]); 14]],
             views: vec![ViewResult {
                 missing: camera.is_none().then(|| "process lost".to_owned()),
                 camera,

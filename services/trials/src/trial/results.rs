@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use failure::Failure;
-use runfiles::{CameraTimes, FrameLine, Line, PoseTimes, TimesLine};
+use runfiles::{CameraTimes, FrameLine, Line, PersonLine, PoseTimes, TimesLine};
 use skeleton::PARSE14;
 
 use super::Point;
@@ -17,11 +17,14 @@ pub(crate) struct FrameResult {
     pub epoch: u32,
     /// Time at which the result was sent, in milliseconds since the planning of the run.
     pub sent_ms: f64,
-    /// Joints of `skeleton::PARSE14` of the followed person in world coordinates, in metres; `None` for a joint that was not found.
-    pub joints: Vec<Option<Point>>,
+    /// Joints of `skeleton::PARSE14` of each person in world coordinates, in metres; `None` for a joint that was not found.
+    pub people: Vec<Joints>,
     /// Views in the order of the rig.
     pub views: Vec<ViewResult>,
 }
+
+/// Joints of a person, in metres; `None` for a joint that was not found.
+pub(crate) type Joints = Vec<Option<Point>>;
 
 /// One view of a result.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,7 +40,23 @@ pub(crate) struct ViewResult {
 impl FrameResult {
     /// Returns true if any joint was found.
     pub(crate) fn is_posed(&self) -> bool {
-        self.joints.iter().any(Option::is_some)
+        self.people.iter().flatten().any(Option::is_some)
+    }
+
+    /// Returns the joints of the person who is nearest to a true one, on average over the joints that were found. Returns joints that were
+    /// not found if there is nobody.
+    pub(crate) fn nearest(&self, truth: &[Point]) -> Joints {
+        let away = |joints: &Joints| {
+            let both =
+                joints.iter().zip(truth).filter_map(|(found, truth)| Some(((*found)?, truth)));
+            let (n, sum) = both.fold((0.0, 0.0), |(n, sum), (found, truth)| {
+                let squared: f64 = (0..3).map(|axis| (found[axis] - truth[axis]).powi(2)).sum();
+                (n + 1.0, sum + squared.sqrt())
+            });
+            if n > 0.0 { sum / n } else { f64::INFINITY }
+        };
+        let nearest = self.people.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.cloned().unwrap_or_else(|| vec![None; truth.len()])
     }
 
     /// Returns the time at which the first picture of the result was captured, in milliseconds since the planning of the run.
@@ -75,8 +94,10 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
     let times: BTreeMap<u64, TimesLine> = times.collect();
     let both = frames.iter().filter_map(|line| Some((line, times.get(&line.frame)?)));
     both.map(|(line, time)| {
-        let person = line.followed();
-        let joint = |name: &str| Some(person?.joints.get(name)?.placed()?.position_m);
+        let joints = |person: &PersonLine| -> Joints {
+            let joint = |name: &str| Some(person.joints.get(name)?.placed()?.position_m);
+            PARSE14.joints.iter().map(|named| joint(named.name)).collect()
+        };
         let view = |name: &String| ViewResult {
             missing: line.views_missing.get(name).map(ToString::to_string),
             camera: time.views.get(name).and_then(|view| view.camera),
@@ -86,7 +107,7 @@ fn join(frames: &[FrameLine], times: Vec<TimesLine>, cameras: &[String]) -> Vec<
             frame: line.frame,
             epoch: time.epoch,
             sent_ms: time.sent_ms,
-            joints: PARSE14.joints.iter().map(|named| joint(named.name)).collect(),
+            people: line.people.iter().map(joints).collect(),
             views: cameras.iter().map(view).collect(),
         }
     })
@@ -118,8 +139,14 @@ mod tests {
             panic!("frame 5 has no times: {got:?}")
         };
         assert_eq!((moment.frame, moment.sent_ms), (4, 50.5));
-        assert_eq!(moment.joints[13], Some([1.0, 2.0, 3.0]));
-        assert_eq!(moment.joints.iter().flatten().count(), 1);
+        assert_eq!(moment.people[0][13], Some([1.0, 2.0, 3.0]));
+        assert_eq!(moment.people[0].iter().flatten().count(), 1);
+        assert_eq!(moment.nearest(&[[7.0; 3]; 14])[13], Some([9.0; 3]));
+        let nobody = FrameResult {
+            people: Vec::new(),
+            ..moment.clone()
+        };
+        assert_eq!(nobody.nearest(&[[7.0; 3]; 14]), vec![None; 14]);
         assert_eq!(moment.views[0].camera.unwrap().epoch, 1);
         assert_eq!(moment.views[0].pose.unwrap().epoch, 2);
         assert_eq!(moment.epoch, 3);

@@ -56,6 +56,8 @@ pub(crate) struct SyntheticSetup<'a> {
     pub subject: u64,
     /// The action of the person.
     pub action: Action,
+    /// Number of further people, who cross the room.
+    pub passers: u64,
     /// Seed of the motion, the room and the lighting.
     pub seed: u64,
     /// Frames per second.
@@ -104,6 +106,7 @@ impl SyntheticDeployment {
                 rig: RigChoice::File(folder.join("rig.toml")),
                 subject: setup.subject,
                 action: setup.action,
+                passers: setup.passers,
                 seed: setup.seed,
                 rate_hz: setup.rate_hz,
                 ..Settings::default()
@@ -159,14 +162,19 @@ impl SyntheticDeployment {
         )
     }
 
-    /// Returns the true positions of the joints of `skeleton::PARSE14` in the given frames, in world coordinates, in metres.
+    /// Returns the true positions of the joints of `skeleton::PARSE14` of each person in the given frames, in world coordinates, in metres.
     pub(crate) fn truth(
         &self,
         frames: impl Iterator<Item = u64>,
-    ) -> Result<Vec<Vec<Point>>, Failure> {
+    ) -> Result<Vec<Vec<Vec<Point>>>, Failure> {
         let scene = Scene::new(&self.settings).or_fail(ExitKind::Run)?;
-        let joints = frames.map(|frame| scene.joints(scene.seconds(frame)).to_vec());
-        Ok(joints.collect())
+        let people = |frame: u64| {
+            let seconds = scene.seconds(frame);
+            let others = scene.other_joints(seconds).into_iter();
+            let all = std::iter::once(scene.joints(seconds)).chain(others);
+            all.map(|joints| joints.to_vec()).collect()
+        };
+        Ok(frames.map(people).collect())
     }
 }
 
