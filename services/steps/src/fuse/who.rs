@@ -49,25 +49,34 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
     };
     let mut place = Place::of(service.bus());
     let mut step = begin(service, job, settings, &mut place);
-    let mut is_noted = true;
+    // If this process dies before the first frame, no identity was sent yet.
+    let mut is_noted = note(&mut place, &step, true);
     stage.run(|frame| {
-        let answers: Vec<Option<ViewSightings>> = (0..n_views)
-            .map(|view| answer(service, frame, view))
-            .collect();
+        let answers: Vec<Option<ViewSightings>> =
+            (0..n_views).map(|view| answer(service, frame, view)).collect();
         let present = answers.iter().enumerate();
         let present = present.filter(|(_, answer)| answer.is_some());
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
         let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
         // The identities are saved before they are sent, so that a restarted process knows every identity that was sent.
-        let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
-        if let Err(error) = noted.as_ref() && is_noted {
-            tracing::warn!(%error, "cannot save the identities of people: if this process dies, people get new identities");
-        }
-        is_noted = noted.is_ok();
+        is_noted = note(&mut place, &step, is_noted);
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;
         people.send_and_account(frame.turn(), 0, message)
     })
+}
+
+/// Saves the identities of people, and returns true if that worked. Warns if it does not work any more.
+///
+/// * `is_noted`: true if it worked the last time.
+fn note(place: &mut Place, step: &WhoStep, is_noted: bool) -> bool {
+    let noted = place.note_bytes(bytemuck::cast_slice(&step.memory()));
+    if let Err(error) = noted.as_ref()
+        && is_noted
+    {
+        tracing::warn!(%error, "cannot save the identities of people: if this process dies, people get new identities");
+    }
+    noted.is_ok()
 }
 
 /// Returns the step. After a restart, it continues with the people and identities of the previous process.
