@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
-use training::networks::{Backend, Pass, Task, TrainError, Trainer};
+use training::networks::{About, Backend, BeginError, Parameter, Pass, Task, TrainError, Trainer};
 
 /// A network from an earlier training.
 #[derive(Debug, Clone)]
@@ -37,6 +37,42 @@ pub(crate) struct Shown<'a, T: Task> {
     pub(crate) curves: &'a dyn Fn(&[PassOf<T>]) -> String,
     /// Describes a pass in a line of text, which follows the number of the step.
     pub(crate) words: &'a dyn Fn(&PassOf<T>) -> String,
+}
+
+/// Reads the parameters of the network to start from; `None` for random parameters.
+///
+/// * `command`: the command that made the network, for the hint.
+pub(crate) fn begun(
+    job: &Job,
+    command: &str,
+    read: impl FnOnce(&[u8]) -> Result<Vec<Parameter>, BeginError>,
+) -> Result<Option<Vec<Parameter>>, Failure> {
+    let begun = |from: &Earlier| {
+        read(&from.bytes).map_err(|error| {
+            let hint = format!(
+                "--from needs a network made by `{command}`, with the same `shape` as in the settings"
+            );
+            failure::in_file(&from.file, &error).with_hint(hint)
+        })
+    };
+    job.from.as_ref().map(begun).transpose()
+}
+
+/// Describes a training for the card of its network.
+///
+/// * `examples`: training examples and held-out examples.
+pub(crate) fn about<T: Task<Score: Default>, E>(
+    job: &Job,
+    trainer: &Trainer<T>,
+    (examples, samples): ([&[E]; 2], usize),
+) -> About<T::Score> {
+    let score = trainer.passes().iter().rev().find_map(|pass| pass.score);
+    About {
+        examples: examples.map(<[_]>::len),
+        samples,
+        goes_on: job.from.is_some(),
+        score: score.unwrap_or_default(),
+    }
 }
 
 /// Returns the path of a file beside the output file.

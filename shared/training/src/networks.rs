@@ -13,6 +13,7 @@
 mod begun;
 mod checkpoint;
 mod compute;
+mod course;
 mod lesson;
 mod onnx;
 mod ops;
@@ -30,7 +31,9 @@ pub mod finder;
 pub mod pose;
 pub mod quality;
 
+pub use begun::BeginError;
 pub use checkpoint::StoreError;
+pub use course::{About, TooFew};
 pub use lesson::Shown;
 pub use onnx::{Document, write};
 pub use ops::{Conv, Dims, Network, Ops, Output, Places, Scaling};

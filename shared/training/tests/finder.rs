@@ -3,10 +3,10 @@
 
 use proptest::prelude::*;
 use training::networks::finder::{
-    About, Around, BOXES, CHANNELS, FinderTask, PICTURE, Picture, STRIDE, Settings, Shape, Vary,
-    card, plain, varied,
+    Around, BOXES, CHANNELS, FinderTask, PICTURE, Picture, STRIDE, Settings, Shape, Vary, card,
+    plain, varied,
 };
-use training::networks::{Backend, Plan, Task as _, Trainer};
+use training::networks::{About, Backend, Plan, Task as _, Trainer};
 
 /// Pictures of bright upright boxes on noise; every fourth picture shows no people.
 fn pictures(n: usize, seed: u64) -> Vec<Picture> {

@@ -4,10 +4,10 @@ use exports::report::curves::{self, Line, Panel};
 use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use inputs::cards::METADATA_KEY;
 use training::networks::Trainer;
-use training::networks::finder::{self, About, Cost, FinderTask, Score, Settings};
+use training::networks::finder::{self, Cost, FinderTask, Score, Settings};
 
 use super::Prepared;
-use crate::trained::{self, Earlier, Job, Shown};
+use crate::trained::{self, Job, Shown};
 
 /// Results of a hundred training steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
@@ -24,23 +24,13 @@ pub fn train(
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Vec<Pass>, Failure> {
     let shown = [pictures.learnt.as_slice(), pictures.kept.as_slice()];
-    let begun = |from: &Earlier| {
-        let begun = finder::begun(&settings.shape, settings.seed, &from.bytes);
-        begun.map_err(|error| {
-            let hint = "--from needs a network made by `train finder`, with the same `shape` as in the settings";
-            failure::in_file(&from.file, &error).with_hint(hint)
-        })
-    };
-    let from = job.from.as_ref().map(begun).transpose()?;
+    let from = trained::begun(job, "train finder", |file| {
+        finder::begun(&settings.shape, settings.seed, file)
+    })?;
     let task = FinderTask::new(settings, shown, from).or_fail(ExitKind::Input)?;
     let written = |trainer: &Trainer<FinderTask<'_>>| {
-        let score = trainer.passes().iter().rev().find_map(|pass| pass.score);
-        let about = About {
-            pictures: shown.map(<[_]>::len),
-            samples: settings.steps * settings.batch,
-            goes_on: job.from.is_some(),
-            score: score.unwrap_or_default(),
-        };
+        let samples = settings.steps * settings.batch;
+        let about = trained::about(job, trainer, (shown, samples));
         let card = finder::card(&settings.shape, &about);
         trainer.onnx(&[(METADATA_KEY.to_owned(), card)])
     };
@@ -53,22 +43,18 @@ pub fn train(
 
 /// Draws the costs, and the quality of the network on held-out pictures.
 fn drawn(passes: &[Pass]) -> String {
-    let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
-        name,
-        values: passes.iter().map(|pass| f64::from(value(pass))).collect(),
+    let cost = |name, value: &dyn Fn(&Cost) -> f32| {
+        Line::new(name, passes.iter().map(|pass| value(&pass.cost)))
     };
-    let judged: Vec<Score> = passes.iter().filter_map(|pass| pass.score).collect();
-    let score = |name, value: &dyn Fn(&Score) -> f32| Line {
-        name,
-        values: judged.iter().map(|score| f64::from(value(score))).collect(),
-    };
+    let judged = || passes.iter().filter_map(|pass| pass.score.as_ref());
+    let score = |name, value: &dyn Fn(&Score) -> f32| Line::new(name, judged().map(value));
     let panel = |what, lines| Panel { what, lines };
     let panels = [
         panel(
             "cost",
             vec![
-                cost("heat", &|pass| pass.cost.heat),
-                cost("sides", &|pass| pass.cost.sides),
+                cost("heat", &|cost| cost.heat),
+                cost("sides", &|cost| cost.sides),
             ],
         ),
         panel(

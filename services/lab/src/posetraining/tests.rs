@@ -1,6 +1,7 @@
 //! Tests of the file of prepared people, and of the card of a trained network.
 
-use training::networks::pose::{About, N_JOINTS, N_KEYPOINTS, Source, Target};
+use training::networks::About;
+use training::networks::pose::{N_JOINTS, N_KEYPOINTS, Source, Target};
 
 use super::*;
 

@@ -1,8 +1,8 @@
 //! The training: from prepared people to an ONNX file with its card.
 
 use exports::report::curves::{self, Line, Panel};
-use training::networks::pose::{self, About, Cost, PoseTask, Score, Settings};
-use training::networks::{Parameter, Trainer};
+use training::networks::Trainer;
+use training::networks::pose::{self, Cost, PoseTask, Score, Settings};
 
 use super::Prepared;
 use crate::trained::{self, Job, Shown};
@@ -12,40 +12,21 @@ use inputs::cards::METADATA_KEY;
 /// Results of a hundred training steps.
 pub type Pass = training::networks::Pass<Cost, Score>;
 
-/// Reads the network to start from; `None` for random parameters.
-fn begun(job: &Job, settings: &Settings) -> Result<Option<Vec<Parameter>>, Failure> {
-    let Some(from) = &job.from else {
-        return Ok(None);
-    };
-    let begun = pose::begun(&settings.shape, settings.seed, &from.bytes).map_err(|error| {
-        let hint = "--from needs a network made by `train network`, with the same `shape` as in the settings";
-        failure::in_file(&from.file, &error).with_hint(hint)
-    })?;
-    Ok(Some(begun))
-}
-
 /// Draws the costs of all passes, and the scores on held-out people.
 fn drawn(passes: &[Pass]) -> String {
-    let cost = |name, value: &dyn Fn(&Pass) -> f32| Line {
-        name,
-        values: passes.iter().map(|pass| f64::from(value(pass))).collect(),
+    let cost = |name, value: &dyn Fn(&Cost) -> f32| {
+        Line::new(name, passes.iter().map(|pass| value(&pass.cost)))
     };
-    let judged: Vec<Score> = passes.iter().filter_map(|pass| pass.score).collect();
-    let score = |name, value: &dyn Fn(&Score) -> f32| Line {
-        name,
-        values: judged.iter().map(|judged| f64::from(value(judged))).collect(),
-    };
+    let judged = || passes.iter().filter_map(|pass| pass.score.as_ref());
+    let score = |name, value: &dyn Fn(&Score) -> f32| Line::new(name, judged().map(value));
     let panel = |what, lines| Panel { what, lines };
     let panels = [
-        panel(
-            "cost of the maps",
-            vec![cost("learnt", &|pass| pass.cost.maps)],
-        ),
+        panel("cost of the maps", vec![cost("learnt", &|cost| cost.maps)]),
         panel(
             "cost of direction and error",
             vec![
-                cost("direction", &|pass| pass.cost.front),
-                cost("error", &|pass| pass.cost.error),
+                cost("direction", &|cost| cost.front),
+                cost("error", &|cost| cost.error),
             ],
         ),
         panel(
@@ -73,20 +54,17 @@ pub fn train(
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Vec<Pass>, Failure> {
     let learnt = [people.learnt.as_slice(), people.kept.as_slice()];
-    let from = begun(job, settings)?;
+    let from = trained::begun(job, "train network", |file| {
+        pose::begun(&settings.shape, settings.seed, file)
+    })?;
     let task = PoseTask::new(settings, learnt, from).or_fail(ExitKind::Input)?;
     let shown = Shown {
         curves: &drawn,
         words: &line,
     };
     let written = |trainer: &Trainer<PoseTask<'_>>| {
-        let score = trainer.passes().iter().rev().find_map(|pass| pass.score);
-        let about = About {
-            people: learnt.map(<[_]>::len),
-            samples: settings.steps * settings.batch,
-            goes_on: job.from.is_some(),
-            score: score.unwrap_or_default(),
-        };
+        let samples = settings.steps * settings.batch;
+        let about = trained::about(job, trainer, (learnt, samples));
         let card = pose::card(&settings.shape, &about);
         trainer.onnx(&[(METADATA_KEY.to_owned(), card)])
     };

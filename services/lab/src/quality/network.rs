@@ -49,10 +49,7 @@ fn validated(pass: &Pass) -> Validated {
 
 /// Draws two panels: the losses, and below them the area under the ROC curve.
 fn drawn(passes: &[Pass], best: Option<usize>) -> String {
-    let line = |name, value: &dyn Fn(&Pass) -> f64| Line {
-        name,
-        values: passes.iter().map(value).collect(),
-    };
+    let line = |name, value: &dyn Fn(&Pass) -> f64| Line::new(name, passes.iter().map(value));
     let losses = Panel {
         what: "loss",
         lines: vec![

@@ -15,6 +15,14 @@ pub struct Line<'a> {
     pub values: Vec<f64>,
 }
 
+impl<'a> Line<'a> {
+    /// Creates a line.
+    pub fn new(name: &'a str, values: impl Iterator<Item: Into<f64>>) -> Self {
+        let values = values.map(Into::into).collect();
+        Self { name, values }
+    }
+}
+
 /// A diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel<'a> {
@@ -111,10 +119,7 @@ mod tests {
 
     #[test]
     fn curves_cover_all_passes_and_the_best_pass_is_marked() {
-        let line = |name, values: [f64; 3]| Line {
-            name,
-            values: values.to_vec(),
-        };
+        let line = |name, values: [f64; 3]| Line::new(name, values.into_iter());
         let losses = Panel {
             what: "loss",
             lines: vec![line("a", [3.0, 2.0, 1.0]), line("b", [3.5, 2.5, 1.5])],

@@ -17,12 +17,11 @@ mod settings;
 mod task;
 mod vary;
 
-pub use crate::networks::begun::BeginError;
-pub use card::{About, card};
+pub use card::card;
 pub use cost::{Cost, Truth};
 pub use network::{BOXES, CHANNELS, PICTURE, STRIDE, Shape, begun, initial};
 pub use picture::{Around, Picture, SIDE};
 pub use score::{Score, Tally};
 pub use settings::{Settings, Vary};
-pub use task::{FinderTask, NobodyShown, file};
+pub use task::FinderTask;
 pub use vary::{FinderSample, plain, varied};

@@ -25,8 +25,7 @@ mod task;
 mod vary;
 mod window;
 
-pub use crate::networks::begun::BeginError;
-pub use card::{About, card};
+pub use card::card;
 pub use cost::{Cost, Truth};
 pub use marks::{Marks, exchange_sides};
 pub use network::{
@@ -35,7 +34,7 @@ pub use network::{
 pub use person::{Person, SIDE, Source, Target, WINDOW};
 pub use score::{Judged, Score};
 pub use settings::{Settings, Vary};
-pub use task::{Found, PoseTask, TooFew, file};
+pub use task::{Found, PoseTask, file};
 pub use vary::{DEVIATION, MEAN, NetworkSample, plain, varied};
 pub(in crate::networks) use vary::{coarsen, recolour};
 pub use window::{FILL, MARGIN};

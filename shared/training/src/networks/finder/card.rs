@@ -2,6 +2,7 @@
 
 use super::network::{BOXES, PICTURE, STRIDE, Shape};
 use super::score::Score;
+use crate::networks::course::About;
 use crate::networks::pose::{DEVIATION, FILL, MEAN};
 
 /// Minimum score of a box that is kept.
@@ -10,22 +11,9 @@ const LEAST_SCORE: f64 = 0.2;
 /// can overlap by more than half.
 const MOST_OVERLAP: f64 = 0.65;
 
-/// Information for a card about the training.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct About {
-    /// Number of training pictures and of held-out pictures.
-    pub pictures: [usize; 2],
-    /// Number of samples used for training.
-    pub samples: usize,
-    /// True if the training started from a previously trained network.
-    pub goes_on: bool,
-    /// Quality of the network on the held-out pictures.
-    pub score: Score,
-}
-
 /// The text of the card, in TOML.
-pub fn card(shape: &Shape, about: &About) -> String {
-    let [learnt, kept] = about.pictures;
+pub fn card(shape: &Shape, about: &About<Score>) -> String {
+    let [learnt, kept] = about.examples;
     let Score {
         people,
         recall,

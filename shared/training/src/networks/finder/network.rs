@@ -105,7 +105,7 @@ pub fn initial(shape: &Shape, seed: u64) -> Vec<Parameter> {
     all
 }
 
-/// Reads the parameters of a network that [`file()`](super::file()) wrote, from which a training run starts.
+/// Reads the parameters of a network that [`Trainer::onnx`](crate::networks::Trainer::onnx) wrote, from which a training run starts.
 ///
 /// * `shape`: sizes of the network. The side of the input may differ from that of the file.
 /// * `seed`: seed for the initial weights of channels whose weights in the file are all 0.

@@ -1,61 +1,26 @@
 //! The training of the network that finds people: steps of Adam, with smaller pictures at first.
 
+use formats::checksum::fnv1a;
 use keypoints::DetectorCard;
 use rayon::prelude::*;
 
-use super::card::{About, card};
+use super::card::card;
 use super::cost::{Cost, Truth};
 use super::network::{CHANNELS, Shape, initial};
 use super::picture::Picture;
 use super::score::{Score, Tally};
 use super::settings::Settings;
 use super::vary::{FinderSample, plain, varied};
+use crate::networks::course::{self, About, JUDGED_AT_ONCE, TooFew};
 use crate::networks::lesson::Shown;
-use crate::networks::onnx::{self, Document};
-use crate::networks::optimiser::{Rule, Schedule, Step};
+use crate::networks::optimiser::{Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
 use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
-/// Number of pictures that are evaluated at once.
-const JUDGED_AT_ONCE: usize = 32;
 /// Share of the steps in which the step length rises.
 const RISING: f32 = 0.05;
-/// Number of steps in a pass.
-const STEPS: usize = 100;
-/// Number of passes between two evaluations on the held-out pictures.
-const JUDGED: usize = 10;
-
-/// Writes a network as an ONNX file, with weights in half precision.
-///
-/// * `parameters`: in the order of [`initial`].
-/// * `metadata`: keys and values of the file's metadata.
-///
-/// # Panics
-///
-/// Panics if the parameters belong to a different network.
-pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
-    onnx::write(shape, parameters, document(metadata))
-}
-
-fn document(metadata: &[(String, String)]) -> Document {
-    Document {
-        name: "boxes".to_owned(),
-        metadata: metadata.to_vec(),
-        has_half_weights: true,
-    }
-}
-
-/// There are no training pictures, or no held-out pictures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} pictures for training and {kept} held out are too few")]
-pub struct NobodyShown {
-    /// Number of training pictures.
-    pub learnt: usize,
-    /// Number of held-out pictures.
-    pub kept: usize,
-}
 
 /// The training of the network that finds people.
 #[derive(Debug)]
@@ -76,7 +41,7 @@ impl<'a> FinderTask<'a> {
     ///
     /// # Errors
     ///
-    /// Fails with [`NobodyShown`].
+    /// Fails with [`TooFew`].
     ///
     /// # Panics
     ///
@@ -85,11 +50,8 @@ impl<'a> FinderTask<'a> {
         settings: &'a Settings,
         [learnt, kept]: [&'a [Picture]; 2],
         from: Option<Vec<Parameter>>,
-    ) -> Result<Self, NobodyShown> {
-        if learnt.is_empty() || kept.is_empty() {
-            let [learnt, kept] = [learnt.len(), kept.len()];
-            return Err(NobodyShown { learnt, kept });
-        }
+    ) -> Result<Self, TooFew> {
+        course::check(Self::LEARNED_FROM, [learnt.len(), kept.len()])?;
         let text = card(&settings.shape, &About::default());
         #[expect(clippy::expect_used, reason = "it was written here")]
         let card = DetectorCard::parse(&text).expect("a card");
@@ -171,11 +133,7 @@ impl Task for FinderTask<'_> {
     }
 
     fn plan(&self, steps: usize, passes: usize) -> Plan {
-        let left = self.settings.steps.saturating_sub(steps);
-        Plan {
-            steps: left.min(STEPS),
-            is_judged: left <= STEPS || (passes + 1).is_multiple_of(JUDGED),
-        }
+        course::plan(self.settings.steps.saturating_sub(steps), passes)
     }
 
     fn learned(&self, _nth: usize, parameters: &[Parameter]) -> Vec<bool> {
@@ -184,14 +142,8 @@ impl Task for FinderTask<'_> {
 
     fn step(&self, nth: usize) -> Step {
         let settings = self.settings;
-        Step {
-            rule: Rule::Adam,
-            rate: self.rate(nth),
-            decay: settings.decay,
-            longest: settings.longest,
-            // At the beginning of the training, there are only a few steps to average.
-            averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
-        }
+        let limits = [settings.decay, settings.longest, settings.averaged];
+        course::step(nth, self.rate(nth), limits)
     }
 
     fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
@@ -203,7 +155,7 @@ impl Task for FinderTask<'_> {
             seen.iter().flat_map(part).copied().collect()
         };
         Batch {
-            shown: shown(&seen),
+            shown: course::shown(&seen, |sample| &sample.picture),
             truth: Truth {
                 heat: joined(&|sample| &sample.heat),
                 sides: joined(&|sample| &sample.sides),
@@ -223,12 +175,9 @@ impl Task for FinderTask<'_> {
     }
 
     fn mean(&self, costs: &[(usize, Cost)]) -> Cost {
-        let n = costs.len().max(1) as f32;
-        let mean =
-            |part: &dyn Fn(&Cost) -> f32| costs.iter().map(|(_, cost)| part(cost)).sum::<f32>() / n;
         Cost {
-            heat: mean(&|cost| cost.heat),
-            sides: mean(&|cost| cost.sides),
+            heat: course::mean(costs, |cost| cost.heat),
+            sides: course::mean(costs, |cost| cost.sides),
         }
     }
 
@@ -239,7 +188,7 @@ impl Task for FinderTask<'_> {
         for pictures in self.kept.chunks(JUDGED_AT_ONCE) {
             let seen: Vec<FinderSample> =
                 pictures.par_iter().map(|picture| plain(picture, shape)).collect();
-            let outputs = find(&shown(&seen));
+            let outputs = find(&course::shown(&seen, |sample| &sample.picture));
             let found = outputs.first().map_or(&[][..], Vec::as_slice);
             for (picture, found) in pictures.iter().zip(found.chunks_exact(n)) {
                 tally.add(&picture.people, &self.boxes(picture, found));
@@ -275,28 +224,15 @@ impl Trainer<FinderTask<'_>> {
     ///
     /// * `metadata`: keys and values of the file's metadata.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
-        self.file(document(metadata))
-    }
-}
-
-fn shown(seen: &[FinderSample]) -> Shown {
-    let pictures = seen.iter().flat_map(|sample| &sample.picture);
-    Shown {
-        n: seen.len(),
-        inputs: vec![pictures.copied().collect()],
+        self.file(course::document("boxes", metadata))
     }
 }
 
 /// Hash of everything that the result depends on.
 fn stamp(settings: &Settings, pictures: [&[Picture]; 2], from: Option<&[Parameter]>) -> u64 {
-    let mut bytes = format!("{settings:?}").into_bytes();
-    for picture in pictures.into_iter().flatten() {
-        bytes.extend(formats::checksum::fnv1a(&picture.rgb).to_le_bytes());
-        bytes.extend(format!("{:?}{:?}", picture.size, picture.people).into_bytes());
-    }
-    let from = from.into_iter().flatten();
-    for value in from.flat_map(|list| &list.values) {
-        bytes.extend(value.to_bits().to_le_bytes());
-    }
-    formats::checksum::fnv1a(&bytes)
+    let samples = pictures.into_iter().flatten().map(|picture| {
+        let truth = format!("{:?}{:?}", picture.size, picture.people);
+        (fnv1a(&picture.rgb), truth)
+    });
+    course::stamp(settings, samples, from)
 }

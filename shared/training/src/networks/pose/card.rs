@@ -6,23 +6,11 @@ use super::network::{ERROR, EXTRAS, FRONT, MAPS, PICTURE, Shape};
 use super::score::Score;
 use super::vary::{DEVIATION, MEAN};
 use super::window::{FILL, MARGIN};
-
-/// Information for a card about the training.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct About {
-    /// Number of training people and of held-out people.
-    pub people: [usize; 2],
-    /// Number of samples used for training.
-    pub samples: usize,
-    /// True if the training started from a previously trained network.
-    pub goes_on: bool,
-    /// Quality of the network on the held-out people.
-    pub score: Score,
-}
+use crate::networks::course::About;
 
 /// The text of the card, in TOML.
-pub fn card(shape: &Shape, about: &About) -> String {
-    let [learnt, kept] = about.people;
+pub fn card(shape: &Shape, about: &About<Score>) -> String {
+    let [learnt, kept] = about.examples;
     let Score {
         people: judged,
         mean_of_ends,

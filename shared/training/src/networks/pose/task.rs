@@ -1,5 +1,6 @@
 //! The training of the network that finds joints: steps of Adam with growing pictures, then steps for the expected error alone.
 
+use formats::checksum::fnv1a;
 use rayon::prelude::*;
 
 use super::cost::{Cost, Truth};
@@ -9,9 +10,10 @@ use super::person::Person;
 use super::score::{Judged, Score};
 use super::settings::Settings;
 use super::vary::{NetworkSample, plain, varied};
+use crate::networks::course::{self, JUDGED_AT_ONCE, TooFew};
 use crate::networks::lesson::Shown;
-use crate::networks::onnx::{self, Document};
-use crate::networks::optimiser::{Rule, Schedule, Step};
+use crate::networks::onnx;
+use crate::networks::optimiser::{Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
@@ -19,16 +21,10 @@ use crate::networks::training::{Batch, Costed, Plan, Task, Trainer};
 
 /// Number of consecutive people in the list that are assigned together to one of the two parts of [`KeptApart`].
 const RUN: usize = 16;
-/// Number of people that are evaluated at once.
-const JUDGED_AT_ONCE: usize = 32;
 /// Share of the steps in which the step length rises.
 const RISING: f32 = 0.1;
 /// Length of the steps that train only the expected error.
 const ERROR_RATE: f32 = 3e-4;
-/// Number of steps in a pass.
-const STEPS: usize = 100;
-/// Number of passes between two evaluations on held-out people.
-const JUDGED: usize = 10;
 
 /// Writes a network as an ONNX file, with weights in half precision.
 ///
@@ -39,15 +35,7 @@ const JUDGED: usize = 10;
 ///
 /// Panics if the parameters belong to a different network.
 pub fn file(shape: &Shape, parameters: &[Parameter], metadata: &[(String, String)]) -> Vec<u8> {
-    onnx::write(shape, parameters, document(metadata))
-}
-
-fn document(metadata: &[(String, String)]) -> Document {
-    Document {
-        name: "pose".to_owned(),
-        metadata: metadata.to_vec(),
-        has_half_weights: true,
-    }
+    onnx::write(shape, parameters, course::document("pose", metadata))
 }
 
 /// Outputs of the network for pictures.
@@ -103,16 +91,6 @@ impl<'a> KeptApart<'a> {
     }
 }
 
-/// There are no training people, or no held-out people.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{learnt} people for training and {kept} held out are too few")]
-pub struct TooFew {
-    /// Number of training people.
-    pub learnt: usize,
-    /// Number of held-out people.
-    pub kept: usize,
-}
-
 /// The training of the network that finds joints.
 #[derive(Debug)]
 pub struct PoseTask<'a> {
@@ -137,10 +115,7 @@ impl<'a> PoseTask<'a> {
         [learnt, kept]: [&'a [Person]; 2],
         from: Option<Vec<Parameter>>,
     ) -> Result<Self, TooFew> {
-        if learnt.is_empty() || kept.is_empty() {
-            let [learnt, kept] = [learnt.len(), kept.len()];
-            return Err(TooFew { learnt, kept });
-        }
+        course::check(Self::LEARNED_FROM, [learnt.len(), kept.len()])?;
         Ok(Self {
             settings,
             stamp: stamp(settings, [learnt, kept], from.as_deref()),
@@ -228,11 +203,7 @@ impl Task for PoseTask<'_> {
         } else {
             self.settings.steps
         };
-        let left = end.saturating_sub(steps);
-        Plan {
-            steps: left.min(STEPS),
-            is_judged: left <= STEPS || (passes + 1).is_multiple_of(JUDGED),
-        }
+        course::plan(end.saturating_sub(steps), passes)
     }
 
     fn restarts(&self, nth: usize) -> bool {
@@ -249,14 +220,8 @@ impl Task for PoseTask<'_> {
 
     fn step(&self, nth: usize) -> Step {
         let settings = self.settings;
-        Step {
-            rule: Rule::Adam,
-            rate: self.rate(nth),
-            decay: settings.decay,
-            longest: settings.longest,
-            // At the beginning of the training, there are only a few steps to average.
-            averaged: settings.averaged.max(1.0 / (nth as f32 + 2.0)),
-        }
+        let limits = [settings.decay, settings.longest, settings.averaged];
+        course::step(nth, self.rate(nth), limits)
     }
 
     fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
@@ -272,7 +237,7 @@ impl Task for PoseTask<'_> {
             .filter_map(|at| self.sample(people, nth * n + at, &network))
             .collect();
         Batch {
-            shown: shown(&seen),
+            shown: course::shown(&seen, |sample| &sample.picture),
             truth: truth(&seen, &network),
             network,
         }
@@ -307,13 +272,10 @@ impl Task for PoseTask<'_> {
     }
 
     fn mean(&self, costs: &[(usize, Cost)]) -> Cost {
-        let n = costs.len().max(1) as f32;
-        let mean =
-            |part: &dyn Fn(&Cost) -> f32| costs.iter().map(|(_, cost)| part(cost)).sum::<f32>() / n;
         Cost {
-            maps: mean(&|cost| cost.maps),
-            front: mean(&|cost| cost.front),
-            error: mean(&|cost| cost.error),
+            maps: course::mean(costs, |cost| cost.maps),
+            front: course::mean(costs, |cost| cost.front),
+            error: course::mean(costs, |cost| cost.error),
         }
     }
 
@@ -343,15 +305,7 @@ impl Trainer<PoseTask<'_>> {
     ///
     /// * `metadata`: keys and values of the file's metadata.
     pub fn onnx(&self, metadata: &[(String, String)]) -> Vec<u8> {
-        self.file(document(metadata))
-    }
-}
-
-fn shown(seen: &[NetworkSample]) -> Shown {
-    let pictures = seen.iter().flat_map(|sample| &sample.picture);
-    Shown {
-        n: seen.len(),
-        inputs: vec![pictures.copied().collect()],
+        self.file(course::document("pose", metadata))
     }
 }
 
@@ -371,7 +325,7 @@ fn score(find: &dyn Fn(&Shown) -> Vec<Vec<f32>>, shape: &Shape, people: &[&Perso
     let judged = people.chunks(JUDGED_AT_ONCE).flat_map(|people| {
         let seen: Vec<NetworkSample> =
             people.par_iter().filter_map(|person| plain(person, shape)).collect();
-        let found = Found::new(find(&shown(&seen)));
+        let found = Found::new(find(&course::shown(&seen, |sample| &sample.picture)));
         let each = seen.iter().enumerate();
         let each = each.map(|(at, seen)| judged(&found, seen, (at, shape.cells())));
         each.collect::<Vec<Judged>>()
@@ -397,14 +351,9 @@ fn judged(found: &Found, seen: &NetworkSample, (at, cells): (usize, [usize; 2]))
 
 /// Hash of everything that the result depends on.
 fn stamp(settings: &Settings, people: [&[Person]; 2], from: Option<&[Parameter]>) -> u64 {
-    let mut bytes = format!("{settings:?}").into_bytes();
-    for person in people.into_iter().flatten() {
-        bytes.extend(formats::checksum::fnv1a(&person.rgb).to_le_bytes());
-        bytes.extend(format!("{:?}{:?}", person.targets, person.front).into_bytes());
-    }
-    let from = from.into_iter().flatten();
-    for value in from.flat_map(|list| &list.values) {
-        bytes.extend(value.to_bits().to_le_bytes());
-    }
-    formats::checksum::fnv1a(&bytes)
+    let samples = people.into_iter().flatten().map(|person| {
+        let truth = format!("{:?}{:?}", person.targets, person.front);
+        (fnv1a(&person.rgb), truth)
+    });
+    course::stamp(settings, samples, from)
 }
