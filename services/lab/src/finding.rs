@@ -11,7 +11,7 @@ mod train;
 
 use std::path::PathBuf;
 
-use failure::{Console, ExitKind, Failure, Stop};
+use failure::{Console, Failure, Stop};
 use posenetwork::Detector;
 pub use training::networks::finder::Picture;
 
@@ -60,17 +60,12 @@ impl Example for Picture {
 ///
 /// # Errors
 ///
-/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`ExitKind::Interrupted`]).
+/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`failure::ExitKind::Interrupted`]).
 pub fn prepare(
     sources: &Sources,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Prepared, Failure> {
-    let go_on = || {
-        if stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
-        Ok(())
-    };
+    let go_on = || stop.check("stopped");
     let mut prepared = Prepared::default();
     for pictures in photographs::pictures(sources, &go_on, console)? {
         for (nth, picture) in pictures.into_iter().enumerate() {

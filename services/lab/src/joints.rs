@@ -52,9 +52,7 @@ pub fn train(
     let sets = found(chosen, &search, stop, console)?;
     let people: Vec<Vec<Marked>> = sets.iter().map(|set| set.people.clone()).collect();
     let tried = try_all(&people);
-    if stop.is_requested() {
-        return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-    }
+    stop.check("stopped")?;
     let Some((settings, errors)) = best_local(&tried) else {
         return Err(Failure::new(ExitKind::Run, "there are no settings to try"));
     };
@@ -101,9 +99,7 @@ fn found(
         let marked: Result<Vec<Option<Marked>>, Failure> = people
             .par_iter()
             .map(|person| {
-                if stop.is_requested() {
-                    return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-                }
+                stop.check("stopped")?;
                 marked(search, person)
             })
             .collect();

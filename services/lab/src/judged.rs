@@ -56,7 +56,7 @@ pub fn judged(
     console: &dyn Console,
 ) -> Result<Pictures, Failure> {
     let find = |person: &Person| {
-        go_on(stop)?;
+        stop.check("interrupted")?;
         let found = find(&reader.search, person)?;
         console.advance(1);
         Ok(found.map(|detection| detection.and_then(|candidate| reader.joints(&candidate))))
@@ -64,14 +64,6 @@ pub fn judged(
     pictures(name, people, console, |people| {
         people.par_iter().map(find).collect()
     })
-}
-
-/// Fails if a stop was requested.
-pub(crate) fn go_on(stop: &Stop) -> Result<(), Failure> {
-    if stop.is_requested() {
-        return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
-    }
-    Ok(())
 }
 
 /// Returns the joints found on people, with the ground truth.

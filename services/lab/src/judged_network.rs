@@ -8,7 +8,7 @@ use posenetwork::{
 };
 use training::datasets::{People, Person, Picture, Sides};
 
-use crate::judged::{go_on, pictures, truth};
+use crate::judged::{pictures, truth};
 
 /// Index of the neck in `skeleton::PARSE14`.
 const NECK: usize = 12;
@@ -71,7 +71,7 @@ pub fn judged(
     let mut memory = LookMemory::default();
     let mut maps = JointMaps::default();
     let find = |person: &Person| {
-        go_on(stop)?;
+        stop.check("interrupted")?;
         let found = reader.find(person, &mut memory, &mut maps)?;
         if found[0].is_some() {
             errors.push(errors_of(&maps, &truth(person)));

@@ -63,21 +63,6 @@ pub struct Report {
     pub judged: Vec<Judged>,
 }
 
-/// State that the threads share.
-struct Work {
-    stop: Stop,
-}
-
-impl Work {
-    /// Fails if a stop was requested.
-    fn go_on(&self) -> Result<(), Failure> {
-        if self.stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
-        Ok(())
-    }
-}
-
 /// Trains a network on rayon's current pool, evaluates it and writes it. The result does not depend on the number of threads.
 ///
 /// # Errors
@@ -90,17 +75,16 @@ pub fn train(
     model: &Arc<Model>,
     (stop, console): (Stop, &dyn Console),
 ) -> Result<Report, Failure> {
-    let work = Work { stop };
-    let (mut samples, mut judged) = marked::samples(job, &work)?;
+    let (mut samples, mut judged) = marked::samples(job, &stop)?;
     let n_photographs = samples.len();
     let n_behind = samples.iter().filter(|sample| sample.front[1] < 0.0).count();
     console.message(&format!(
         "{n_photographs} photographs of people, {n_behind} of them from behind"
     ));
-    samples.extend(rendered::samples(&job.scenes, model, &work)?);
+    samples.extend(rendered::samples(&job.scenes, model, &stop)?);
     let n_rendered = samples.len() - n_photographs;
     if job.judge_scenes.n > 0 {
-        let scenes = rendered::samples(&job.judge_scenes, model, &work)?;
+        let scenes = rendered::samples(&job.judge_scenes, model, &stop)?;
         judged.push(("scenes".to_owned(), scenes));
     }
     console.message(&format!("{n_rendered} pictures of scenes"));
@@ -109,10 +93,10 @@ pub fn train(
             "pass {} of {}: loss {:.4}",
             pass.nth, pass.of, pass.loss
         ));
-        work.go_on().is_ok()
+        !stop.is_requested()
     };
     let network = viewquality::orientation::train(&samples, &job.settings, watch);
-    work.go_on()?;
+    stop.check("stopped")?;
     let network = network.ok_or_else(|| {
         let message = "there are no people for training, because no person's direction is known";
         Failure::new(ExitKind::Input, message)

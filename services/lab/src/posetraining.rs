@@ -14,7 +14,7 @@ use training::networks::pose::{Person, SIDE};
 use crate::person::Chosen;
 use crate::prepared::Example;
 use crate::scenes::Scenes;
-use failure::{Console, ExitKind, Failure, Stop};
+use failure::{Console, Failure, Stop};
 
 pub use crate::prepared::{read, write};
 pub use crate::trained::{Earlier, Job};
@@ -60,10 +60,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Fails if a stop was requested.
     fn go_on(&self) -> Result<(), Failure> {
-        if self.stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
-        Ok(())
+        self.stop.check("stopped")
     }
 }
 
@@ -71,7 +68,7 @@ impl Work<'_> {
 ///
 /// # Errors
 ///
-/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`ExitKind::Interrupted`]).
+/// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`failure::ExitKind::Interrupted`]).
 pub fn prepare(
     people: &People,
     (stop, console): (Stop, &dyn Console),

@@ -147,9 +147,7 @@ pub fn export(
     std::fs::create_dir_all(&job.out).map_err(|error| cannot_write(&job.out, &error))?;
     let mut written = Vec::new();
     for (format, paths) in plan {
-        if stop.is_requested() {
-            return Err(interrupted());
-        }
+        stop.check("interrupted")?;
         console.begin(format.name(), "");
         match format {
             Format::File(format) => {
@@ -325,10 +323,6 @@ pub(crate) fn cannot_write(path: &Path, error: &io::Error) -> Failure {
         ExitKind::Input,
         format!("cannot write {}: {error}", path.display()),
     )
-}
-
-pub(crate) fn interrupted() -> Failure {
-    Failure::new(ExitKind::Interrupted, "interrupted")
 }
 
 /// Returns a camera, with intrinsics for the pictures of its footage.

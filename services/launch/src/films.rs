@@ -262,7 +262,7 @@ impl Reader<'_> {
         let mut found = Vec::new();
         let mut shots = Vec::new();
         for frame in frames.step_by(part.every as usize) {
-            self.go_on()?;
+            self.stop.check("interrupted")?;
             let known = source.of_frame(frame, &mut found).or_fail(ExitKind::Input)?;
             self.console.advance(1);
             if known.is_some() {
@@ -296,7 +296,7 @@ impl Reader<'_> {
         let mut watch = eyes.watch(deployment, size, rate_hz / part.every as f64);
         let mut shots = Vec::new();
         loop {
-            self.go_on()?;
+            self.stop.check("interrupted")?;
             let Some(frame) = feed.next_frame().or_fail(ExitKind::Input)? else {
                 break;
             };
@@ -328,13 +328,6 @@ impl Reader<'_> {
         let n = (frames.end - frames.start).div_ceil(part.every);
         self.console.begin(self.name, "");
         self.console.set(0, n as usize);
-    }
-
-    fn go_on(&self) -> Result<(), Failure> {
-        if self.stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
-        }
-        Ok(())
     }
 
     fn person(&self, found: &[Option<Keypoint>]) -> Person {

@@ -55,6 +55,24 @@ pub fn unless_stopped<T: Send + 'static>(
     }
 }
 
+/// Runs `work` as [`unless_stopped`] does.
+///
+/// # Errors
+///
+/// Fails with [`ExitKind::Interrupted`] if stop was requested, or if the operating system refuses a thread.
+///
+/// # Panics
+///
+/// Panics if `work` panics.
+pub fn uninterrupted<T: Send + 'static>(
+    stop: &Stop,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Failure> {
+    let outcome = unless_stopped(stop, work)?;
+    stop.check("interrupted")?;
+    outcome.ok_or_else(|| Failure::new(ExitKind::Interrupted, "interrupted"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,6 +20,6 @@ pub use console::{Console, Silent};
 pub use failure::{ExitKind, Failure, Fault, OrFail, require_results};
 pub use guard::{end_process, guard_process};
 pub use input::{in_file, no_text, read_text};
-pub use interrupt::unless_stopped;
+pub use interrupt::{uninterrupted, unless_stopped};
 pub use log::init_logging;
 pub use stop::Stop;

@@ -17,7 +17,7 @@ use signal_hook::consts::{SIGALRM, SIGHUP, SIGINT, SIGTERM};
 use signal_hook::low_level::{emulate_default_handler, exit};
 use signal_hook_registry::register_sigaction;
 
-use crate::now_nanos;
+use crate::{ExitKind, Failure, now_nanos};
 
 /// The signals that request a stop.
 const SIGNALS: [i32; 3] = [SIGINT, SIGTERM, SIGHUP];
@@ -136,6 +136,18 @@ impl Stop {
     /// Returns true if stop was requested.
     pub fn is_requested(&self) -> bool {
         self.inner.requested.load(Ordering::Acquire)
+    }
+
+    /// Fails with [`ExitKind::Interrupted`] and a message if stop was requested.
+    ///
+    /// # Errors
+    ///
+    /// See above.
+    pub fn check(&self, message: &str) -> Result<(), Failure> {
+        if self.is_requested() {
+            return Err(Failure::new(ExitKind::Interrupted, message));
+        }
+        Ok(())
     }
 
     /// Waits until a signal that is not from the supervisor ends the process, or until stop is requested. Such a

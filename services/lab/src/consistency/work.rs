@@ -236,12 +236,11 @@ impl<'a> Learning<'a> {
             let mut film = Film::open(sequence, &self.job.film).map_err(film_failure)?;
             let mut bench = self.bench(sequence, &film, trials)?;
             for frame in &sequence.frames {
-                if self.stop.is_requested() {
-                    let failure = Failure::new(ExitKind::Interrupted, "interrupted");
-                    return Err(failure.with_hint(
+                self.stop.check("interrupted").map_err(|failure| {
+                    failure.with_hint(
                         "if weights were being tried, OUT contains the tables learned so far",
-                    ));
-                }
+                    )
+                })?;
                 let images = film.at(frame.index).map_err(film_failure)?;
                 visit(&mut bench, sequence, frame, &images);
                 done += 1;

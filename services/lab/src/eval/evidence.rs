@@ -113,9 +113,7 @@ impl EvidenceJob<'_> {
             let mut film = Film::open(sequence, &self.film).or_fail(ExitKind::Input)?;
             let cameras = film.cameras();
             for (nth, frame) in sequence.frames.iter().enumerate() {
-                if self.stop.is_requested() {
-                    return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
-                }
+                self.stop.check("interrupted")?;
                 let images = film.at(frame.index).or_fail(ExitKind::Input)?;
                 let instant = Instant {
                     nth,
@@ -148,9 +146,7 @@ impl EvidenceJob<'_> {
             let mut film = Film::open(sequence, &self.film).or_fail(ExitKind::Input)?;
             let mut estimator = self.as_run.estimator(sequence, &film.cameras())?;
             for frame in &sequence.frames {
-                if self.stop.is_requested() {
-                    return Err(Failure::new(ExitKind::Interrupted, "interrupted"));
-                }
+                self.stop.check("interrupted")?;
                 let joints = as_run::joints(&mut estimator, &mut film, frame.index)?;
                 tally.add(&joints, &truth(sequence, frame));
                 done += 1;

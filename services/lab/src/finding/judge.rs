@@ -22,9 +22,7 @@ pub fn judge(
     console.begin("", "pictures");
     console.set(0, pictures.kept.len());
     for picture in &pictures.kept {
-        if stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
+        stop.check("stopped")?;
         let [width, height] = picture.size;
         let view = Rgb8View::new(width, height, &picture.rgb).or_fail(ExitKind::Input)?;
         let found = detector.people(view, &mut values);

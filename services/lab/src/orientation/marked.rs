@@ -1,13 +1,13 @@
 //! People in photographs, from their marked joints.
 
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{ExitKind, Failure, OrFail as _, Stop};
 use footage::Fill;
 use rayon::prelude::*;
 use training::datasets::{Person, ReadOptions, Selection, SkeletonTable};
 use viewquality::Sampler;
 use viewquality::orientation::{Sample, Tile};
 
-use super::{Job, Work};
+use super::Job;
 use crate::failures::dataset_failure;
 use crate::person::deal;
 
@@ -46,7 +46,7 @@ const BEND: f64 = 0.35;
 type Named = (String, Vec<Sample>);
 
 /// Returns the samples for training, and the samples of every data set for the evaluation.
-pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>), Failure> {
+pub(super) fn samples(job: &Job, stop: &Stop) -> Result<(Vec<Sample>, Vec<Named>), Failure> {
     let all = &job.datasets;
     let only = deal(all, "--only", &job.only, false)?;
     let judged = deal(all, "--judge", &job.judge, false)?;
@@ -59,7 +59,7 @@ pub(super) fn samples(job: &Job, work: &Work) -> Result<(Vec<Sample>, Vec<Named>
                 .people
                 .par_iter()
                 .map(|person| {
-                    work.go_on()?;
+                    stop.check("stopped")?;
                     of_person(person)
                 })
                 .collect();

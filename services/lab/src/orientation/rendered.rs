@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use failure::Failure;
+use failure::{Failure, Stop};
 use fmp::{Model, Scope};
 use geometry::Camera;
 use nalgebra::{Point3, Vector3};
@@ -10,7 +10,6 @@ use training::datasets::SkeletonTable;
 use viewquality::Sampler;
 use viewquality::orientation::{Sample, Tile};
 
-use super::Work;
 use crate::scenes::{Scenes, Shown, of_pictures};
 use crate::searches::Searches;
 
@@ -21,14 +20,14 @@ const MAX_ERROR: f64 = 0.12;
 pub(super) fn samples(
     scenes: &Scenes,
     model: &Arc<Model>,
-    work: &Work,
+    stop: &Stop,
 ) -> Result<Vec<Sample>, Failure> {
     let searches = Searches::new(Arc::clone(model));
     let table = SkeletonTable::published();
     of_pictures(
         scenes,
         |shown| {
-            work.go_on()?;
+            stop.check("stopped")?;
             Ok(sample(shown, model, &searches, &table))
         },
         |_, _| (),

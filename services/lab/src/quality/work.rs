@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use failure::{Console, ExitKind, Failure, Stop};
+use failure::{Console, Failure, Stop};
 
 use super::observer::Observer;
 
@@ -33,10 +33,7 @@ impl<'a> Work<'a> {
 
     /// Fails if a stop was requested.
     pub(super) fn go_on(&self) -> Result<(), Failure> {
-        if self.stop.is_requested() {
-            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-        }
-        Ok(())
+        self.stop.check("stopped")
     }
 
     /// Counts pictures that were searched.

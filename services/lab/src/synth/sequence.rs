@@ -89,9 +89,7 @@ impl<'a> Sequence<'a> {
                 let last = (CHUNK * (chunk + 1)).min(self.job.n_frames);
                 (CHUNK * chunk..last)
                     .map(|frame| {
-                        if stop.is_requested() {
-                            return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-                        }
+                        stop.check("stopped")?;
                         let seen = self.picture(&mut view, frame)?;
                         console.advance(1);
                         Ok(seen)

@@ -9,7 +9,7 @@ use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use footage::{Canvas, FootageError, Size, VideoWriter};
 
 use super::pictures::Pictures;
-use super::{Written, cannot_write, interrupted};
+use super::{Written, cannot_write};
 
 /// File that marks a folder as written by Parallax, so that it may be replaced.
 const MARK: &str = ".parallax";
@@ -79,9 +79,7 @@ fn write_all(
         let room = room.inner(&view.name);
         let room = room.map_err(|error| cannot_write(&folder.join(&view.name), &error))?;
         for slot in 0..trial.slots.len() {
-            if stop.is_requested() {
-                return Err(interrupted());
-            }
+            stop.check("interrupted")?;
             let name = openpose::file_name(&view.name, trial.frame(slot));
             put(&room, &name, &openpose::frame(trials, slot, view))?;
             console.advance(1);
@@ -147,9 +145,7 @@ fn draw_all(
     console.set(0, trial.slots.len());
     let mut n_without = 0;
     for slot in 0..trial.slots.len() {
-        if stop.is_requested() {
-            return Err(interrupted());
-        }
+        stop.check("interrupted")?;
         let picture = pictures.at(trial.frame(slot))?;
         n_without += usize::from(picture.is_none());
         let mut canvas = picture.map_or_else(

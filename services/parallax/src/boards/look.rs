@@ -106,9 +106,7 @@ pub fn look(
         .collect();
     console.finish();
     let raw = raw.into_iter().collect::<Result<Vec<Raw>, Failure>>()?;
-    if stop.is_requested() {
-        return Err(Failure::new(ExitKind::Interrupted, "stopped"));
-    }
+    stop.check("stopped")?;
     Ok(agreed(&finder, raw))
 }
 

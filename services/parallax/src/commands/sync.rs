@@ -9,7 +9,7 @@ use calibration::synchronisation::{Outcome, Settings, estimate};
 use clap::{Args, Subcommand, ValueEnum};
 use deployment::{ClockKeys, Deployment, with_clocks};
 use failure::wording::Table;
-use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, in_file, unless_stopped};
+use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, in_file, uninterrupted};
 use launch::films::{Films, Part, Poses, films};
 use launch::load;
 use serde_json::{Value, json};
@@ -205,12 +205,8 @@ fn compared(
         mirror,
         n_joints,
     };
-    let outcome = unless_stopped(stop, move || estimate(&cameras, &films, &settings))?;
-    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
-    if stop.is_requested() {
-        return Err(interrupted());
-    }
-    let outcome = outcome.ok_or_else(interrupted)?.or_fail(ExitKind::Input)?;
+    let outcome = uninterrupted(stop, move || estimate(&cameras, &films, &settings))?;
+    let outcome = outcome.or_fail(ExitKind::Input)?;
     Ok((outcome, finders))
 }
 

@@ -5,14 +5,14 @@ use std::process::ExitCode;
 use calibration::people::{Doubt, Outcome, Recording, Scale, Settings, Vertical, estimate};
 use clap::Args;
 use failure::wording::Table;
-use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file, uninterrupted};
 use launch::films::Poses;
 use launch::load;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
 
 use super::misfits;
-use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
+use super::walk::{Walk, WalkArguments, refuse, walk, write_rig};
 
 /// Hint for the user if the result is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute, in view of at least two cameras at every moment, \
@@ -133,7 +133,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         };
         estimate(&recording, &settings)
     };
-    let outcome = computed(&stop, estimated)?.or_fail(ExitKind::Input)?;
+    let outcome = uninterrupted(&stop, estimated)?.or_fail(ExitKind::Input)?;
     let names = walk.names();
     if arguments.walk.json {
         output::json(&as_json(&outcome, &names, &walk.found.finders))?;

@@ -6,13 +6,13 @@ use calibration::people::Recording;
 use calibration::refine::{Outcome, Settings, refine};
 use clap::Args;
 use failure::wording::Table;
-use failure::{ExitKind, Failure, OrFail as _, Stop, in_file};
+use failure::{ExitKind, Failure, OrFail as _, Stop, in_file, uninterrupted};
 use launch::films::Poses;
 use serde_json::{Value, json};
 use terminal::{Globals, output};
 
 use super::misfits;
-use super::walk::{Walk, WalkArguments, computed, refuse, walk, write_rig};
+use super::walk::{Walk, WalkArguments, refuse, walk, write_rig};
 
 /// Hint for the user if the result is refused.
 const HINT: &str = "let one person walk through the whole volume for half a minute; if a camera was moved far, \
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         };
         refine(&recording, &settings)
     };
-    let outcome = computed(&stop, refined)?.or_fail(ExitKind::Input)?;
+    let outcome = uninterrupted(&stop, refined)?.or_fail(ExitKind::Input)?;
     let names = walk.names();
     if arguments.walk.json {
         output::json(&as_json(&outcome, &names))?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use calibration::people::Doubt;
 use clap::Args;
 use deployment::Deployment;
-use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop, unless_stopped};
+use failure::{Console as _, ExitKind, Failure, OrFail as _, Stop};
 use geometry::files::Format;
 use geometry::{Camera, Rig};
 use launch::films::{Films, Part, Poses, films};
@@ -105,19 +105,6 @@ pub(super) fn walk(
         found,
         offsets_s,
     })
-}
-
-/// Runs a long computation. Ctrl-C ends it.
-pub(super) fn computed<T: Send + 'static>(
-    stop: &Stop,
-    compute: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Failure> {
-    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
-    let outcome = unless_stopped(stop, compute)?;
-    if stop.is_requested() {
-        return Err(interrupted());
-    }
-    outcome.ok_or_else(interrupted)
 }
 
 /// Writes the rig file.

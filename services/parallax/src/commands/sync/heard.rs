@@ -2,7 +2,7 @@
 
 use calibration::synchronisation::{Outcome, Sound, SoundSettings, estimate_by_sound};
 use deployment::Deployment;
-use failure::{ExitKind, Failure, OrFail as _, Stop, unless_stopped};
+use failure::{ExitKind, Failure, OrFail as _, Stop, uninterrupted, unless_stopped};
 use footage::{RecordedSound, SourceSpec, read_sound};
 use geometry::Camera;
 use launch::films::{Part, cameras};
@@ -19,7 +19,6 @@ pub(super) fn compared(
     (reference, window_s): (usize, f64),
     stop: &Stop,
 ) -> Result<(Outcome, Vec<String>), Failure> {
-    let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
     let cameras = cameras(deployment, &inputs::rig_of(deployment)?)?;
     let centres = cameras.iter().map(Camera::centre_in_world).collect();
     let mut sounds = Vec::new();
@@ -30,6 +29,7 @@ pub(super) fn compared(
         }
         let spec = launch::cameras::source(camera, &deployment.capture);
         let sound = unless_stopped(stop, move || sound(&name, &spec, part))?;
+        let interrupted = || Failure::new(ExitKind::Interrupted, "interrupted");
         sounds.push(sound.ok_or_else(interrupted)??);
     }
     let settings = SoundSettings {
@@ -37,11 +37,8 @@ pub(super) fn compared(
         window_s,
         centres: Some(centres),
     };
-    let outcome = unless_stopped(stop, move || estimate_by_sound(&sounds, &settings))?;
-    if stop.is_requested() {
-        return Err(interrupted());
-    }
-    let outcome = outcome.ok_or_else(interrupted)?.or_fail(ExitKind::Input)?;
+    let outcome = uninterrupted(stop, move || estimate_by_sound(&sounds, &settings))?;
+    let outcome = outcome.or_fail(ExitKind::Input)?;
     Ok((outcome, vec!["sound".to_owned(); deployment.cameras.len()]))
 }
 
