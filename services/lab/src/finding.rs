@@ -37,10 +37,6 @@ pub struct Sources {
     pub scenes: Scenes,
 }
 
-/// One in this many blocks of photographs is held out, and one in this many subjects of the scenes.
-const KEPT: usize = 12;
-/// Number of consecutive photographs that are held out together, because neighbouring photographs often show the same event.
-const BLOCK: usize = 20;
 /// Margin for hands, feet and hair on each side of the box around the joints, as a fraction of the box's longer side.
 const BEYOND: f64 = 0.05;
 
@@ -65,21 +61,14 @@ pub fn prepare(
     sources: &Sources,
     (stop, console): (&Stop, &dyn Console),
 ) -> Result<Prepared, Failure> {
-    let go_on = || stop.check("stopped");
-    let mut prepared = Prepared::default();
-    for pictures in photographs::pictures(sources, &go_on, console)? {
-        for (nth, picture) in pictures.into_iter().enumerate() {
-            prepared.add(picture, nth / BLOCK % KEPT == KEPT - 1);
-        }
-    }
-    for (subject, picture) in rendered::pictures(&sources.scenes, &go_on, console)? {
-        prepared.add(picture, subject.is_multiple_of(KEPT as u64));
-    }
-    let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!(
-        "{learnt} pictures are used for training, and {kept} are held out"
-    ));
-    Ok(prepared)
+    let photographs = photographs::pictures(sources, (stop, console))?;
+    let photographs = photographs.into_iter().flat_map(|set| set.into_iter().enumerate());
+    let scenes = rendered::pictures(&sources.scenes, (stop, console))?;
+    Ok(Prepared::divided(
+        photographs,
+        scenes,
+        ("pictures", console),
+    ))
 }
 
 /// Returns the box around joints with a margin; `None` if fewer than two are known.

@@ -33,12 +33,6 @@ pub struct People {
     pub scenes: Scenes,
 }
 
-/// One in this many blocks of consecutive people is held out, and one in this many subjects of the scenes.
-const KEPT: usize = 12;
-/// Number of consecutive people of a data set who are held out together, because consecutive entries of a data set often show the same
-/// event.
-const BLOCK: usize = 20;
-
 /// People for training, and held-out people, on whom the expected error is learned.
 pub type Prepared = crate::prepared::Prepared<Person>;
 
@@ -51,19 +45,6 @@ impl Example for Person {
     }
 }
 
-/// State that the threads share.
-struct Work<'a> {
-    stop: Stop,
-    console: &'a dyn Console,
-}
-
-impl Work<'_> {
-    /// Fails if a stop was requested.
-    fn go_on(&self) -> Result<(), Failure> {
-        self.stop.check("stopped")
-    }
-}
-
 /// Prepares people on rayon's current pool; the result does not depend on the number of threads.
 ///
 /// # Errors
@@ -71,24 +52,11 @@ impl Work<'_> {
 /// Fails if a data set, a picture or a scene cannot be used, or on a stop request ([`failure::ExitKind::Interrupted`]).
 pub fn prepare(
     people: &People,
-    (stop, console): (Stop, &dyn Console),
+    (stop, console): (&Stop, &dyn Console),
 ) -> Result<Prepared, Failure> {
-    let work = Work { stop, console };
-    let mut prepared = Prepared::default();
-    let marked = photographs::people(people, &work)?;
-    for (nth, person) in marked {
-        let is_kept = nth / BLOCK % KEPT == KEPT - 1;
-        prepared.add(person, is_kept);
-    }
-    for (subject, person) in rendered::people(&people.scenes, &work)? {
-        let is_kept = subject % KEPT as u64 == 0;
-        prepared.add(person, is_kept);
-    }
-    let [learnt, kept] = [prepared.learnt.len(), prepared.kept.len()];
-    console.message(&format!(
-        "{learnt} people are used for training, and {kept} are held out"
-    ));
-    Ok(prepared)
+    let photographs = photographs::people(people, (stop, console))?;
+    let scenes = rendered::people(&people.scenes, (stop, console))?;
+    Ok(Prepared::divided(photographs, scenes, ("people", console)))
 }
 
 #[cfg(test)]

@@ -2,9 +2,15 @@
 
 use std::io::{BufReader, Read as _, Write as _};
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use failure::{ExitKind, Failure};
+use failure::{Console, ExitKind, Failure};
 use serde::{Serialize, de::DeserializeOwned};
+
+/// One in this many blocks of photographs is held out, and one in this many subjects of the scenes.
+const KEPT: usize = 12;
+/// Number of consecutive photographs that are held out together, because neighbouring photographs often show the same event or person.
+const BLOCK: usize = 20;
 
 /// Training examples and held-out examples.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -25,14 +31,36 @@ impl<T> Default for Prepared<T> {
 }
 
 impl<T> Prepared<T> {
-    /// Adds an example.
-    pub(crate) fn add(&mut self, example: T, is_kept: bool) {
-        let to = if is_kept {
-            &mut self.kept
-        } else {
-            &mut self.learnt
-        };
-        to.push(example);
+    /// Divides examples into training examples and held-out examples, and shows their numbers.
+    ///
+    /// * `photographs`: with their positions in their data set.
+    /// * `scenes`: with the numbers of the subjects.
+    /// * `name`: name of the examples, such as `people`.
+    pub(crate) fn divided(
+        photographs: impl IntoIterator<Item = (usize, T)>,
+        scenes: Vec<(u64, T)>,
+        (name, console): (&str, &dyn Console),
+    ) -> Self {
+        let mut all = Self::default();
+        let photographs = photographs.into_iter();
+        let photographs =
+            photographs.map(|(nth, example)| (nth / BLOCK % KEPT == KEPT - 1, example));
+        let scenes = scenes.into_iter();
+        let scenes =
+            scenes.map(|(subject, example)| (subject.is_multiple_of(KEPT as u64), example));
+        for (is_kept, example) in photographs.chain(scenes) {
+            let to = if is_kept {
+                &mut all.kept
+            } else {
+                &mut all.learnt
+            };
+            to.push(example);
+        }
+        let [learnt, kept] = [all.learnt.len(), all.kept.len()];
+        console.message(&format!(
+            "{learnt} {name} are used for training, and {kept} are held out"
+        ));
+        all
     }
 
     /// Adds all examples of another list.
@@ -40,6 +68,47 @@ impl<T> Prepared<T> {
         self.learnt.append(&mut others.learnt);
         self.kept.append(&mut others.kept);
     }
+}
+
+/// Calls a function on all items, on one thread for each teacher. Without teachers, it starts as many threads as rayon has. Returns the
+/// results in the order of the items.
+///
+/// The function starts its own threads. Networks run on rayon's threads too. While a rayon thread waits for a network, it would start to
+/// process another item, and so on, until its stack overflows.
+///
+/// * `task`: the task of the threads, for the message if one panics.
+pub(crate) fn on_threads<I: Sync, T: Sync, R: Send>(
+    items: &[I],
+    teachers: &[T],
+    task: &str,
+    make: impl Fn(&I, Option<&T>) -> Result<R, Failure> + Sync,
+) -> Result<Vec<R>, Failure> {
+    let n_threads = match teachers.len() {
+        0 => rayon::current_num_threads(),
+        n => n,
+    };
+    let next = AtomicUsize::new(0);
+    let of_thread = |teacher: Option<&T>| {
+        let mut made = Vec::new();
+        loop {
+            let nth = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(nth) else {
+                return Ok::<_, Failure>(made);
+            };
+            made.push((nth, make(item, teacher)?));
+        }
+    };
+    let of_thread = &of_thread;
+    let made: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..n_threads)
+            .map(|nth| scope.spawn(move || of_thread(teachers.get(nth))))
+            .collect();
+        let died = |_| Failure::new(ExitKind::Run, format!("a thread that {task} has panicked"));
+        threads.into_iter().map(|thread| thread.join().map_err(died)?).collect()
+    });
+    let mut made: Vec<(usize, R)> = made?.into_iter().flatten().collect();
+    made.sort_by_key(|(nth, _)| *nth);
+    Ok(made.into_iter().map(|(_, result)| result).collect())
 }
 
 /// A kind of example with its own file format.

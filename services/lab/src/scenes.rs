@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use kernels::Rgb8View;
 use rayon::prelude::*;
 use scene::truth::N_JOINTS;
@@ -49,6 +49,13 @@ pub(crate) struct Shown<'a> {
     pub(crate) everybody: Vec<Body>,
 }
 
+impl Shown<'_> {
+    /// Returns the number of the subject.
+    pub(crate) fn subject(&self) -> Option<u64> {
+        self.group.rsplit(' ').next()?.parse().ok()
+    }
+}
+
 /// A person in a picture.
 pub(crate) struct Body {
     /// Joints of `skeleton::PARSE14` in world coordinates, in metres.
@@ -64,17 +71,34 @@ pub(crate) struct Body {
 /// Calls a function on every picture of all scenes, and returns the results in the order of the scenes, whatever the number of threads.
 ///
 /// * `make`: returns the result of one picture; `None` if the picture cannot be used.
+/// * `stop`: checked before every picture.
 /// * `watch`: called after every camera, with its number of pictures, and the number of unusable pictures among them.
 pub(crate) fn of_pictures<T: Send>(
     scenes: &Scenes,
-    make: impl Fn(&Shown<'_>) -> Result<Option<T>, Failure> + Sync,
+    stop: &Stop,
+    make: impl Fn(&Shown<'_>) -> Option<T> + Sync,
     watch: impl Fn(usize, usize) + Sync,
 ) -> Result<Vec<T>, Failure> {
     let made: Result<Vec<_>, Failure> = (0..scenes.n)
         .into_par_iter()
-        .map(|nth| of_scene(scenes, &settings(scenes, nth), &make, &watch))
+        .map(|nth| of_scene(scenes, &settings(scenes, nth), (stop, &make), &watch))
         .collect();
     Ok(made?.into_iter().flatten().collect())
+}
+
+/// Calls a function on every picture of all scenes, as [`of_pictures`] does, and shows the progress.
+pub(crate) fn of_pictures_shown<T: Send>(
+    scenes: &Scenes,
+    (stop, console): (&Stop, &dyn Console),
+    make: impl Fn(&Shown<'_>) -> Option<T> + Sync,
+) -> Result<Vec<T>, Failure> {
+    if scenes.n == 0 {
+        return Ok(Vec::new());
+    }
+    console.begin("scenes", "pictures");
+    let found = of_pictures(scenes, stop, make, |n, _| console.advance(n));
+    console.finish();
+    found
 }
 
 /// Returns the settings of a scene by its number. Actions and subjects alternate; everything else is random.
@@ -120,7 +144,7 @@ fn settings(scenes: &Scenes, nth: u32) -> Settings {
 fn of_scene<T>(
     scenes: &Scenes,
     settings: &Settings,
-    make: &impl Fn(&Shown<'_>) -> Result<Option<T>, Failure>,
+    (stop, make): (&Stop, &impl Fn(&Shown<'_>) -> Option<T>),
     watch: &impl Fn(usize, usize),
 ) -> Result<Vec<T>, Failure> {
     let scene = Arc::new(Scene::new(settings).or_fail(ExitKind::Input)?);
@@ -147,7 +171,8 @@ fn of_scene<T>(
                 camera,
                 everybody: everybody(&scene, camera, (truth.seconds, &view)),
             };
-            all.extend(make(&shown)?);
+            stop.check("stopped")?;
+            all.extend(make(&shown));
         }
         let n = usize::from(scenes.frames);
         watch(n, n - (all.len() - before));

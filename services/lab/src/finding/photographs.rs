@@ -1,9 +1,8 @@
 //! Photographs of annotated people, to which a teacher adds the other people, and photographs without people.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
-use failure::{Console, ExitKind, Failure, OrFail as _};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use keypoints::PersonBox;
 use posenetwork::Detector;
 use training::datasets::{Person, Picture as Read, ReadOptions, SkeletonTable};
@@ -13,6 +12,7 @@ use super::reduced::{Box4, reduced};
 use super::{Sources, around_joints};
 use crate::failures::dataset_failure;
 use crate::person::read_options;
+use crate::prepared::on_threads;
 
 /// Score above which a box of the teacher counts as a person. Boxes with a lower score are ignored.
 const SURE: f64 = 0.4;
@@ -31,8 +31,7 @@ struct Photograph {
 /// Returns the photographs of every data set, then those without people.
 pub(super) fn pictures(
     sources: &Sources,
-    go_on: &(dyn Fn() -> Result<(), Failure> + Sync),
-    console: &dyn Console,
+    (stop, console): (&Stop, &dyn Console),
 ) -> Result<Vec<Vec<Picture>>, Failure> {
     let chosen = &sources.photographs;
     let options = read_options(chosen, &SkeletonTable::published())?;
@@ -54,10 +53,17 @@ pub(super) fn pictures(
     for (path, photographs) in all {
         console.begin(&crate::eval::pictures::name(path), "photographs");
         console.set(0, photographs.len());
-        let read = read_all(&photographs, &sources.teachers, &|| {
-            console.advance(1);
-            go_on()
-        });
+        let task = "reads photographs";
+        let read = on_threads(
+            &photographs,
+            &sources.teachers,
+            task,
+            |photograph, teacher| {
+                console.advance(1);
+                stop.check("stopped")?;
+                read(photograph, teacher)
+            },
+        );
         console.finish();
         pictures.push(read?);
     }
@@ -86,59 +92,12 @@ fn photographs(people: &[Person]) -> Vec<Photograph> {
     all
 }
 
-/// Reads photographs on separate threads. The reason is explained in `posetraining`.
-fn read_all(
-    photographs: &[Photograph],
-    teachers: &[Detector],
-    go_on: &(dyn Fn() -> Result<(), Failure> + Sync),
-) -> Result<Vec<Picture>, Failure> {
-    let n_threads = match teachers.len() {
-        0 => rayon::current_num_threads(),
-        n => n,
-    };
-    let next = AtomicUsize::new(0);
-    let of_thread = |teacher: Option<&Detector>| {
-        let mut found = Vec::new();
-        let mut values = Vec::new();
-        loop {
-            let nth = next.fetch_add(1, Ordering::Relaxed);
-            let Some(photograph) = photographs.get(nth) else {
-                return Ok::<_, Failure>(found);
-            };
-            go_on()?;
-            found.push((nth, read(photograph, teacher, &mut values)?));
-        }
-    };
-    let of_thread = &of_thread;
-    let found: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..n_threads)
-            .map(|nth| scope.spawn(move || of_thread(teachers.get(nth))))
-            .collect();
-        let died = || {
-            Err(Failure::new(
-                ExitKind::Run,
-                "a thread that reads photographs has panicked",
-            ))
-        };
-        let join =
-            |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join().unwrap_or_else(|_| died());
-        threads.into_iter().map(join).collect()
-    });
-    let mut found: Vec<(usize, Picture)> = found?.into_iter().flatten().collect();
-    found.sort_by_key(|(nth, _)| *nth);
-    Ok(found.into_iter().map(|(_, picture)| picture).collect())
-}
-
-fn read(
-    photograph: &Photograph,
-    teacher: Option<&Detector>,
-    values: &mut Vec<f32>,
-) -> Result<Picture, Failure> {
+fn read(photograph: &Photograph, teacher: Option<&Detector>) -> Result<Picture, Failure> {
     let picture = Read::read(&photograph.file).or_fail(ExitKind::Input)?;
     let mut people = Vec::new();
     if let Some(marked) = &photograph.marked {
         people.extend(marked.iter().map(|outline| (*outline, true)));
-        let found = teacher.map(|teacher| teacher.people(picture.view(), values));
+        let found = teacher.map(|teacher| teacher.people(picture.view(), &mut Vec::new()));
         let found = found.transpose().or_fail(ExitKind::Input)?;
         people.extend(added(marked, &found.unwrap_or_default()));
     }

@@ -1,11 +1,11 @@
 //! Pictures of synthetic scenes.
 
-use failure::{Console, Failure};
+use failure::{Console, Failure, Stop};
 use training::networks::finder::Picture;
 
 use super::around_joints;
 use super::reduced::reduced;
-use crate::scenes::{Scenes, Shown, of_pictures};
+use crate::scenes::{Scenes, Shown, of_pictures_shown};
 
 /// A person counts as hidden if less than this fraction of the pixels in the box show the person. Without occlusion, it is about a third.
 const HIDDEN: f64 = 0.08;
@@ -13,27 +13,12 @@ const HIDDEN: f64 = 0.08;
 /// Returns the pictures of all scenes, with the numbers of the subjects.
 pub(super) fn pictures(
     scenes: &Scenes,
-    go_on: &(dyn Fn() -> Result<(), Failure> + Sync),
-    console: &dyn Console,
+    watched: (&Stop, &dyn Console),
 ) -> Result<Vec<(u64, Picture)>, Failure> {
-    if scenes.n == 0 {
-        return Ok(Vec::new());
-    }
-    console.begin("scenes", "pictures");
-    let found = of_pictures(
-        scenes,
-        |shown| {
-            go_on()?;
-            Ok(picture(shown))
-        },
-        |n, _| console.advance(n),
-    );
-    console.finish();
-    found
+    of_pictures_shown(scenes, watched, picture)
 }
 
 fn picture(shown: &Shown<'_>) -> Option<(u64, Picture)> {
-    let subject = shown.group.rsplit(' ').next()?.parse().ok()?;
     let people = shown.everybody.iter().filter_map(|body| {
         let outline = around_joints(body.joints)?;
         let [left, top, right, bottom] = outline;
@@ -43,7 +28,7 @@ fn picture(shown: &Shown<'_>) -> Option<(u64, Picture)> {
     });
     let people: Vec<_> = people.collect();
     Some((
-        subject,
+        shown.subject()?,
         reduced(shown.source.clone(), shown.picture, &people),
     ))
 }

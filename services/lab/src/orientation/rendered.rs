@@ -26,10 +26,8 @@ pub(super) fn samples(
     let table = SkeletonTable::published();
     of_pictures(
         scenes,
-        |shown| {
-            stop.check("stopped")?;
-            Ok(sample(shown, model, &searches, &table))
-        },
+        stop,
+        |shown| sample(shown, model, &searches, &table),
         |_, _| (),
     )
 }

@@ -1,8 +1,6 @@
 //! People in photographs, from their marked joints and a teacher.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use failure::{ExitKind, Failure, OrFail as _};
+use failure::{Console, ExitKind, Failure, OrFail as _, Stop};
 use kernels::Rgb8View;
 use posenetwork::{JointMaps, MapSettings, PoseNetwork, Workspace};
 use training::datasets::{Person as Annotated, Picture, ReadOptions, Sides, SkeletonTable};
@@ -10,11 +8,12 @@ use training::networks::pose::{
     EXTRAS, MIRROR, Marks, N_JOINTS, N_KEYPOINTS, Person, SIDE, Source, Target, exchange_sides,
 };
 
+use super::People;
 use super::crop::Crop;
-use super::{People, Work};
 use crate::failures::dataset_failure;
 use crate::orientation::facing;
 use crate::person::{deal, read_options, sides_of};
+use crate::prepared::on_threads;
 
 /// Pairs of joints that show whether a person is seen from behind: hips and shoulders, the right one first.
 const PAIRS: [[usize; 2]; 2] = [[2, 3], [8, 9]];
@@ -35,7 +34,10 @@ type Point = [f32; 2];
 const UNKNOWN: (Point, f32) = ([f32::NAN; 2], 0.0);
 
 /// Returns all usable people, with their positions in the data set.
-pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Person)>, Failure> {
+pub(super) fn people(
+    people: &People,
+    (stop, console): (&Stop, &dyn Console),
+) -> Result<Vec<(usize, Person)>, Failure> {
     let chosen = &people.photographs;
     let table = SkeletonTable::published();
     let options = read_options(chosen, &table)?;
@@ -50,70 +52,29 @@ pub(super) fn people(people: &People, work: &Work<'_>) -> Result<Vec<(usize, Per
         let read = training::datasets::read(path, &options).map_err(dataset_failure)?;
         for problem in &read.problems {
             let cause = &problem.fault;
-            work.console.message(&format!("left out: {problem}: {cause}"));
+            console.message(&format!("left out: {problem}: {cause}"));
         }
         let n = read.people.len();
-        work.console.begin(&crate::eval::pictures::name(path), "people");
-        work.console.set(0, n);
-        let found = of_all(&read.people, (sides, &people.teachers), work);
-        work.console.finish();
+        console.begin(&crate::eval::pictures::name(path), "people");
+        console.set(0, n);
+        let task = "prepares the images of people";
+        let found = on_threads(&read.people, &people.teachers, task, |person, teachers| {
+            stop.check("stopped")?;
+            let found = of_person(person, sides, teachers.map_or(&[], Vec::as_slice))?;
+            console.advance(1);
+            Ok(found)
+        });
+        console.finish();
         let before = all.len();
-        all.extend(found?);
+        let found = found?.into_iter().enumerate();
+        all.extend(found.filter_map(|(nth, person)| Some((nth, person?))));
         let used = all.len() - before;
-        work.console.message(&format!(
+        console.message(&format!(
             "{}: {used} of {n} people can be used",
             crate::eval::pictures::name(path)
         ));
     }
     Ok(all)
-}
-
-/// Returns the usable people, with their positions in the data set.
-///
-/// The function starts its own threads. Networks run on rayon's threads too. While a rayon thread waits for a network, it would start to
-/// process another person, and so on, until its stack overflows.
-fn of_all(
-    people: &[Annotated],
-    (sides, teachers): (Sides, &[Vec<PoseNetwork>]),
-    work: &Work<'_>,
-) -> Result<Vec<(usize, Person)>, Failure> {
-    let n_threads = match teachers.len() {
-        0 => rayon::current_num_threads(),
-        n => n,
-    };
-    let next = AtomicUsize::new(0);
-    let of_thread = |teachers: &[PoseNetwork]| {
-        let mut found = Vec::new();
-        loop {
-            let nth = next.fetch_add(1, Ordering::Relaxed);
-            let Some(person) = people.get(nth) else {
-                return Ok::<_, Failure>(found);
-            };
-            work.go_on()?;
-            found.extend(of_person(person, sides, teachers)?.map(|found| (nth, found)));
-            work.console.advance(1);
-        }
-    };
-    let of_thread = &of_thread;
-    let found: Result<Vec<_>, Failure> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..n_threads)
-            .map(|i| teachers.get(i).map_or(&[][..], Vec::as_slice))
-            .map(|teachers| scope.spawn(move || of_thread(teachers)))
-            .collect();
-        let died = || {
-            Err(Failure::new(
-                ExitKind::Run,
-                "a thread that prepares the images of people has panicked",
-            ))
-        };
-        let join = |scoped_join_handle: std::thread::ScopedJoinHandle<'_, _>| {
-            scoped_join_handle.join().unwrap_or_else(|_| died())
-        };
-        threads.into_iter().map(join).collect()
-    });
-    let mut found: Vec<(usize, Person)> = found?.into_iter().flatten().collect();
-    found.sort_by_key(|person| person.0);
-    Ok(found)
 }
 
 /// Returns a person; `None` if the trunk is unknown or the person is too small.

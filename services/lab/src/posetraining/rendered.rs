@@ -1,12 +1,11 @@
 //! Synthetic people.
 
-use failure::Failure;
+use failure::{Console, Failure, Stop};
 use training::networks::pose::{EXTRAS, N_KEYPOINTS, Person, Source, Target, exchange_sides};
 
-use super::Work;
 use super::crop::Crop;
 use crate::orientation::front_in_view;
-use crate::scenes::{Body, Scenes, Shown, of_pictures};
+use crate::scenes::{Body, Scenes, Shown, of_pictures_shown};
 
 /// Smallest number of joints in front of the camera for a person to be used.
 const FEWEST: usize = 10;
@@ -14,29 +13,21 @@ const FEWEST: usize = 10;
 const HIDDEN: f64 = 0.1;
 
 /// Returns everybody in all scenes, with the numbers of the scenes' subjects.
-pub(super) fn people(scenes: &Scenes, work: &Work<'_>) -> Result<Vec<(u64, Person)>, Failure> {
-    let console = work.console;
-    if scenes.n == 0 {
-        return Ok(Vec::new());
-    }
-    console.begin("scenes", "pictures");
-    let found = of_pictures(
-        scenes,
-        |shown| {
-            work.go_on()?;
-            Ok(Some(in_picture(shown)))
-        },
-        |n, _| console.advance(n),
-    );
-    console.finish();
+pub(super) fn people(
+    scenes: &Scenes,
+    (stop, console): (&Stop, &dyn Console),
+) -> Result<Vec<(u64, Person)>, Failure> {
+    let found = of_pictures_shown(scenes, (stop, console), |shown| Some(in_picture(shown)));
     let found: Vec<_> = found?.into_iter().flatten().collect();
-    console.message(&format!("scenes: {} pictures of people", found.len()));
+    if scenes.n > 0 {
+        console.message(&format!("scenes: {} pictures of people", found.len()));
+    }
     Ok(found)
 }
 
 /// Returns the people in a picture.
 fn in_picture(shown: &Shown<'_>) -> Vec<(u64, Person)> {
-    let subject = shown.group.rsplit(' ').next().and_then(|number| number.parse().ok());
+    let subject = shown.subject();
     let people = shown.everybody.iter().filter_map(|body| Some((subject?, person(shown, body)?)));
     people.collect()
 }

@@ -75,11 +75,11 @@ pub fn make(
 fn scenes(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
     of_pictures(
         &job.scenes,
+        &work.stop,
         |shown| {
-            work.go_on()?;
             let named = (shown.group.to_owned(), shown.source.clone());
             let found = work.observer.observe(shown.picture, &shown.joints, named);
-            Ok(found.ok())
+            found.ok()
         },
         |n, n_lost| work.done(n, n_lost),
     )
@@ -104,7 +104,7 @@ fn people(job: &Job, work: &Work<'_>) -> Result<Vec<Sample>, Failure> {
             .people
             .par_iter()
             .map(|person| {
-                work.go_on()?;
+                work.stop.check("stopped")?;
                 let picture = Picture::read(&person.image).or_fail(ExitKind::Input)?;
                 let file = person.image.file_name().unwrap_or_default().to_string_lossy();
                 let source = format!("{name} {file}");

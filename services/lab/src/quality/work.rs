@@ -2,14 +2,14 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use failure::{Console, Failure, Stop};
+use failure::{Console, Stop};
 
 use super::observer::Observer;
 
 /// State that all threads share.
 pub(super) struct Work<'a> {
     pub(super) observer: Observer,
-    stop: Stop,
+    pub(super) stop: Stop,
     console: &'a dyn Console,
     n_done: AtomicUsize,
     n_lost: AtomicUsize,
@@ -29,11 +29,6 @@ impl<'a> Work<'a> {
     /// Returns the number of pictures without a sample.
     pub(super) fn n_lost(&self) -> usize {
         self.n_lost.load(Ordering::Relaxed)
-    }
-
-    /// Fails if a stop was requested.
-    pub(super) fn go_on(&self) -> Result<(), Failure> {
-        self.stop.check("stopped")
     }
 
     /// Counts pictures that were searched.

@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         },
     };
     let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
-    let prepared = posetraining::prepare(&people, (stop, &terminal))?;
+    let prepared = posetraining::prepare(&people, (&stop, &terminal))?;
     posetraining::write(&arguments.out, &prepared)?;
     if arguments.json {
         output::json(&json!({
