@@ -9,97 +9,68 @@ mod settings;
 
 use std::fs;
 
-use common::{Case, Ended, PLAIN, planted};
+use common::{Case, PLAIN, planted};
 use image::DynamicImage;
+use mistakes::{DRY, NOTHING, check, oops};
 use serde_json::Value;
 
-const DRY: &[&str] = &["run", "deployment.toml", "--dry-run"];
-const RUN: &[&str] = &["run", "deployment.toml"];
-const DETECT: &[&str] = &["detect", "it.png", "--model", "model.plx", "--json"];
-
-/// A mistake in a valid deployment of two views, `a` and `b`, with two frames each.
-struct Row {
-    what: &'static str,
-    broken: fn(&Case),
-    arguments: &'static [&'static str],
-    code: i32,
-    /// Words that the message must contain.
-    words: &'static [&'static str],
-}
-
-fn check(rows: &[Row]) {
-    let mut wrong = Vec::new();
-    for row in rows {
-        let case = Case::new("bad", &[2; 2], PLAIN);
-        (row.broken)(&case);
-        let Ended {
-            status,
-            stdout,
-            stderr,
-        } = case.start(row.arguments).wait();
-        case.assert_nothing_left();
-        let lacks = row.words.iter().find(|word| !stderr.contains(**word));
-        if status.code() != Some(row.code) || lacks.is_some() || !stdout.is_empty() {
-            wrong.push(format!(
-                "{}: {status}, expected {}; lacks {lacks:?}\n{stdout}{stderr}",
-                row.what, row.code
-            ));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-}
+const RUN: &str = "run deployment.toml";
+const DETECT: &str = "detect it.png --model model.plx --json";
 
 #[test]
 fn deployment_files() {
-    check(&[
-        Row {
-            what: "unknown key",
-            broken: |fixture| fixture.edit("deployment.toml", "workers", "wrokers"),
-            arguments: DRY,
-            code: 3,
-            words: &["deployment.toml:21", "wrokers", "did you mean `workers`"],
-        },
-        Row {
-            what: "no such file",
-            broken: |fixture| fs::remove_file(fixture.path("deployment.toml")).unwrap(),
-            arguments: DRY,
-            code: 4,
-            words: &["deployment.toml", "No such file"],
-        },
-        Row {
-            what: "frames of fewer than 40 pixels",
-            broken: |fixture| {
-                fixture.edit("deployment.toml", "upright", "size = [96, 39]\nupright");
-            },
-            arguments: DRY,
-            code: 4,
-            words: &["view \"a\"", "96x39", "40"],
-        },
-    ]);
+    check(
+        (DRY, 4),
+        &[
+            oops(
+                "unknown key",
+                |fixture| fixture.edit("deployment.toml", "workers", "wrokers"),
+                &["deployment.toml:21", "wrokers", "did you mean `workers`"],
+                &[],
+            )
+            .with(DRY, 3),
+            oops(
+                "no such file",
+                |fixture| fs::remove_file(fixture.path("deployment.toml")).unwrap(),
+                &["deployment.toml", "No such file"],
+                &[],
+            ),
+            oops(
+                "frames of fewer than 40 pixels",
+                |fixture| {
+                    fixture.edit("deployment.toml", "upright", "size = [96, 39]\nupright");
+                },
+                &["view \"a\"", "96x39", "40"],
+                &[],
+            ),
+        ],
+    );
 }
 
 #[test]
 fn footage() {
-    check(&[
-        Row {
-            what: "empty first image",
-            broken: |fixture| fixture.write("b/0000.png", ""),
-            arguments: RUN,
-            code: 4,
-            words: &["b/0000.png", "0 bytes"],
-        },
-        Row {
-            what: "images of one pixel",
-            broken: |fixture| {
-                for name in ["b/0000.png", "b/0001.png"] {
-                    picture(1, 1).save(fixture.path(name)).unwrap();
-                }
-            },
-            arguments: DRY,
-            code: 5,
-            words: &["camera \"b\"", "1x1", "calibrated for 96x128"],
-        },
-    ]);
+    check(
+        (RUN, 4),
+        &[
+            oops(
+                "empty first image",
+                |fixture| fixture.write("b/0000.png", ""),
+                &["b/0000.png", "0 bytes"],
+                &[],
+            ),
+            oops(
+                "images of one pixel",
+                |fixture| {
+                    for name in ["b/0000.png", "b/0001.png"] {
+                        picture(1, 1).save(fixture.path(name)).unwrap();
+                    }
+                },
+                &["camera \"b\"", "1x1", "calibrated for 96x128"],
+                &[],
+            )
+            .with(DRY, 5),
+        ],
+    );
 }
 
 #[test]
@@ -124,162 +95,168 @@ fn an_image_of_another_size_is_named_and_affects_only_its_own_frame() {
 
 #[test]
 fn models() {
-    check(&[Row {
-        what: "some other file",
-        broken: |fixture| {
-            let picture = fs::read(fixture.path("a/0000.png")).unwrap();
-            fixture.write("model.plx", picture);
-        },
-        arguments: DRY,
-        code: 4,
-        words: &["model.plx is not a model", "PNG"],
-    }]);
+    check(
+        (DRY, 4),
+        &[oops(
+            "some other file",
+            |fixture| {
+                let picture = fs::read(fixture.path("a/0000.png")).unwrap();
+                fixture.write("model.plx", picture);
+            },
+            &["model.plx is not a model", "PNG"],
+            &[],
+        )],
+    );
 }
 
 #[test]
 fn calibrations() {
-    check(&[
-        Row {
-            what: "for another image size",
-            broken: |fixture| {
-                fixture.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]");
-            },
-            arguments: DRY,
-            code: 5,
-            words: &[
-                "camera \"a\"",
-                "96x128",
-                "calibrated for 128x96",
-                "the sizes agree if the pictures are rotated",
-            ],
-        },
-        Row {
-            what: "without one of the cameras",
-            broken: |fixture| fixture.edit("deployment.toml", "name = \"b\"", "name = \"z\""),
-            arguments: RUN,
-            code: 5,
-            words: &["rig.toml", "no camera \"z\"", "a, b"],
-        },
-        Row {
-            what: "absent",
-            broken: |fixture| fs::remove_file(fixture.path("rig.toml")).unwrap(),
-            arguments: RUN,
-            code: 4,
-            words: &["rig.toml", "parallax calib convert"],
-        },
-    ]);
+    check(
+        (DRY, 5),
+        &[
+            oops(
+                "for another image size",
+                |fixture| {
+                    fixture.edit("rig.toml", "size_px = [96, 128]", "size_px = [128, 96]");
+                },
+                &[
+                    "camera \"a\"",
+                    "96x128",
+                    "calibrated for 128x96",
+                    "the sizes agree if the pictures are rotated",
+                ],
+                &[],
+            ),
+            oops(
+                "without one of the cameras",
+                |fixture| fixture.edit("deployment.toml", "name = \"b\"", "name = \"z\""),
+                &["rig.toml", "no camera \"z\"", "a, b"],
+                &[],
+            )
+            .with(RUN, 5),
+            oops(
+                "absent",
+                |fixture| fs::remove_file(fixture.path("rig.toml")).unwrap(),
+                &["rig.toml", "parallax calib convert"],
+                &[],
+            )
+            .with(RUN, 4),
+        ],
+    );
 }
 
 #[test]
 fn tables_of_expected_errors() {
-    check(&[
-        Row {
-            what: "expected errors without one of the views",
-            broken: |fixture| {
-                fixture.edit(
-                    "deployment.toml",
-                    "workers = 2",
-                    "workers = 2\nerrors = { table = \"q.csv\" }",
-                );
-                let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
-                let (parts, row) = (parts.join(","), ",1".repeat(26));
-                fixture.write(
-                    "q.csv",
-                    format!("frame,view,{parts}\n0,a{row}\n0,C2{row}\n"),
-                );
-            },
-            arguments: DRY,
-            code: 4,
-            words: &["q.csv", "no rows for", "view `b`", "C2"],
-        },
-        Row {
-            what: "a name for a camera that is not there",
-            broken: |fixture| {
-                let errors = "workers = 2\n\
+    check(
+        (DRY, 4),
+        &[
+            oops(
+                "expected errors without one of the views",
+                |fixture| {
+                    fixture.edit(
+                        "deployment.toml",
+                        "workers = 2",
+                        "workers = 2\nerrors = { table = \"q.csv\" }",
+                    );
+                    let parts: Vec<String> = (1..27).map(|part| format!("part_{part}")).collect();
+                    let (parts, row) = (parts.join(","), ",1".repeat(26));
+                    fixture.write(
+                        "q.csv",
+                        format!("frame,view,{parts}\n0,a{row}\n0,C2{row}\n"),
+                    );
+                },
+                &["q.csv", "no rows for", "view `b`", "C2"],
+                &[],
+            ),
+            oops(
+                "a name for a camera that is not there",
+                |fixture| {
+                    let errors = "workers = 2\n\
                     errors = { table = \"q.csv\", views = { z = \"C1\" } }";
-                fixture.edit("deployment.toml", "workers = 2", errors);
-            },
-            arguments: DRY,
-            code: 3,
-            words: &["paper.errors.views", "\"z\"", "[[camera]]"],
-        },
-    ]);
+                    fixture.edit("deployment.toml", "workers = 2", errors);
+                },
+                &["paper.errors.views", "\"z\"", "[[camera]]"],
+                &[],
+            )
+            .with(DRY, 3),
+        ],
+    );
 }
 
 #[test]
 fn thresholds() {
-    check(&[
-        Row {
-            what: "thresholds with a NaN",
-            broken: |fixture| {
-                let tau = "workers = 2\ntau = { file = \"tau.txt\" }";
-                fixture.edit("deployment.toml", "workers = 2", tau);
-                fixture.write("tau.txt", "1 2\n3 nan");
-            },
-            arguments: DRY,
-            code: 4,
-            words: &["tau.txt: line 2", "`nan`"],
-        },
-        Row {
-            what: "thresholds of a model of other parts",
-            broken: |fixture| {
-                fixture.edit(
-                    "deployment.toml",
-                    "workers = 2",
-                    "workers = 2\ntau = [1, 2]",
-                );
-            },
-            arguments: DRY,
-            code: 3,
-            words: &["`paper.tau` has 2 thresholds", "26 parts"],
-        },
-    ]);
+    check(
+        (DRY, 4),
+        &[
+            oops(
+                "thresholds with a NaN",
+                |fixture| {
+                    let tau = "workers = 2\ntau = { file = \"tau.txt\" }";
+                    fixture.edit("deployment.toml", "workers = 2", tau);
+                    fixture.write("tau.txt", "1 2\n3 nan");
+                },
+                &["tau.txt: line 2", "`nan`"],
+                &[],
+            ),
+            oops(
+                "thresholds of a model of other parts",
+                |fixture| {
+                    fixture.edit(
+                        "deployment.toml",
+                        "workers = 2",
+                        "workers = 2\ntau = [1, 2]",
+                    );
+                },
+                &["`paper.tau` has 2 thresholds", "26 parts"],
+                &[],
+            )
+            .with(DRY, 3),
+        ],
+    );
 }
 
 #[test]
 fn part_type_tables() {
-    check(&[Row {
-        what: "part-type table with a NaN",
-        broken: |fixture| {
-            let tables = "workers = 2\n[[paper.compatibility]]\nviews = [\"a\", \"b\"]\n\
+    check(
+        (DRY, 4),
+        &[oops(
+            "part-type table with a NaN",
+            |fixture| {
+                let tables = "workers = 2\n[[paper.compatibility]]\nviews = [\"a\", \"b\"]\n\
                               files = [\"ab.csv\", \"ba.csv\"]";
-            fixture.edit("deployment.toml", "workers = 2", tables);
-            let rows: Vec<String> = (2..54).map(|row| format!("{},0.5,0.5\n", row / 2)).collect();
-            let rows = rows.concat();
-            fixture.write("ab.csv", &rows);
-            fixture.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
-        },
-        arguments: DRY,
-        code: 4,
-        words: &["ba.csv: line 3, column 2", "`NaN`"],
-    }]);
+                fixture.edit("deployment.toml", "workers = 2", tables);
+                let rows: Vec<String> =
+                    (2..54).map(|row| format!("{},0.5,0.5\n", row / 2)).collect();
+                let rows = rows.concat();
+                fixture.write("ab.csv", &rows);
+                fixture.write("ba.csv", rows.replacen("2,0.5,0.5", "2,NaN,0.5", 1));
+            },
+            &["ba.csv: line 3, column 2", "`NaN`"],
+            &[],
+        )],
+    );
 }
 
 #[test]
 fn single_images() {
-    check(&[
-        Row {
-            what: "absent",
-            broken: |_| {},
-            arguments: DETECT,
-            code: 4,
-            words: &["no such footage", "it.png"],
-        },
-        Row {
-            what: "0 bytes",
-            broken: |fixture| fixture.write("it.png", ""),
-            arguments: DETECT,
-            code: 4,
-            words: &["it.png", "0 bytes"],
-        },
-        Row {
-            what: "39 pixels high",
-            broken: |fixture| picture(96, 39).save(fixture.path("it.png")).unwrap(),
-            arguments: DETECT,
-            code: 4,
-            words: &["it.png", "96x39", "40"],
-        },
-    ]);
+    check(
+        (DETECT, 4),
+        &[
+            oops("absent", NOTHING, &["no such footage", "it.png"], &[]),
+            oops(
+                "0 bytes",
+                |fixture| fixture.write("it.png", ""),
+                &["it.png", "0 bytes"],
+                &[],
+            ),
+            oops(
+                "39 pixels high",
+                |fixture| picture(96, 39).save(fixture.path("it.png")).unwrap(),
+                &["it.png", "96x39", "40"],
+                &[],
+            ),
+        ],
+    );
 }
 
 #[test]

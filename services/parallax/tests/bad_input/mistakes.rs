@@ -21,15 +21,38 @@ const NEVER: &[&str] = &[
 
 /// A mistake in a valid deployment of two views, `a` and `b`, with two frames each.
 pub(crate) struct Mistake {
-    pub(crate) what: &'static str,
-    pub(crate) made: fn(&Case),
-    /// The arguments of the program, as shell text.
-    pub(crate) command: &'static str,
-    pub(crate) code: i32,
+    what: &'static str,
+    made: fn(&Case),
+    /// Command and exit code, if they differ from those of the table.
+    own: Option<(&'static str, i32)>,
     /// Words of the message that name the mistake and its location.
-    pub(crate) says: &'static [&'static str],
+    says: &'static [&'static str],
     /// Words of the hint.
-    pub(crate) tries: &'static [&'static str],
+    tries: &'static [&'static str],
+}
+
+/// Returns a mistake with the command and the exit code of its table.
+pub(crate) const fn oops(
+    what: &'static str,
+    made: fn(&Case),
+    says: &'static [&'static str],
+    tries: &'static [&'static str],
+) -> Mistake {
+    Mistake {
+        what,
+        made,
+        own: None,
+        says,
+        tries,
+    }
+}
+
+impl Mistake {
+    /// Sets the command, as shell text, and the exit code.
+    pub(crate) const fn with(mut self, command: &'static str, code: i32) -> Self {
+        self.own = Some((command, code));
+        self
+    }
 }
 
 pub(crate) const CHECK: &str = "config check deployment.toml";
@@ -74,119 +97,103 @@ fn in_shell(command: &str) -> String {
 }
 
 /// Makes every mistake of a table, and checks the error message.
-pub(crate) fn check(table: &[Mistake]) {
+///
+/// * `common`: the arguments of the program, as shell text, and the exit code.
+pub(crate) fn check(common: (&str, i32), table: &[Mistake]) {
     let mut wrong = Vec::new();
     for it in table {
         let case = Case::new("oops", &[2; 2], PLAIN);
         (it.made)(&case);
-        let Ended { status, stderr, .. } = case.start_in_shell(&in_shell(it.command)).wait();
+        let (command, code) = it.own.unwrap_or(common);
+        let Ended {
+            status,
+            stdout,
+            stderr,
+        } = case.start_in_shell(&in_shell(command)).wait();
         case.assert_nothing_left();
         permit(&case);
         let words = it.says.iter().chain(it.tries);
         let lacks: Vec<&&str> = words.filter(|word| !stderr.contains(**word)).collect();
         let has: Vec<&&str> = NEVER.iter().filter(|word| stderr.contains(**word)).collect();
-        if status.code() != Some(it.code) || !lacks.is_empty() || !has.is_empty() {
+        let is_as_expected = lacks.is_empty() && has.is_empty() && stdout.is_empty();
+        if status.code() != Some(code) || !is_as_expected {
             wrong.push(format!(
-                "{}: {status}, expected {}; lacks {lacks:?}, has {has:?}\n{stderr}",
-                it.what, it.code
+                "{}: {status}, expected {code}; lacks {lacks:?}, has {has:?}\n{stdout}{stderr}",
+                it.what
             ));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-const fn live(what: &'static str, made: fn(&Case), says: &'static [&'static str]) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: CHECK,
-        code: 4,
-        says,
-        tries: &["camera \"b\""],
-    }
-}
-
 const NO_FILES: &[Mistake] = &[
-    live(
+    oops(
         "RTSP",
         |case| source(case, "rtsp://me:secret@127.0.0.1:9/live"),
         &[
             "no pictures were received from rtsp://127.0.0.1:9/live",
             "Connection refused",
         ],
+        &["camera \"b\""],
     ),
-    live(
+    oops(
         "HTTP",
         |case| source(case, "http://127.0.0.1:9/b"),
         &["http://127.0.0.1:9/b", "Connection refused"],
+        &["camera \"b\""],
     ),
-    live(
+    oops(
         "V4L2",
         |case| source(case, "v4l2:/dev/null"),
         &["/dev/null is not a camera"],
+        &["camera \"b\""],
     ),
-    live(
+    oops(
         "device",
         |case| source(case, "/dev/video97"),
         &["cannot open the camera /dev/video97", "No such file"],
+        &["camera \"b\""],
     ),
-    live(
+    oops(
         "number of a webcam",
         |case| source(case, "0"),
         &["number of a webcam", "its source is /dev/video0"],
+        &["camera \"b\""],
     ),
-    live(
+    oops(
         "file:// address",
         |case| source(case, "file:///tmp/b.mp4"),
         &["without file://: /tmp/b.mp4"],
+        &["camera \"b\""],
     ),
-    Mistake {
-        what: "number of a webcam without quotes",
-        made: |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = 0"),
-        command: CHECK,
-        code: 3,
-        says: &["deployment.toml:12", "`camera.source`", "found 0"],
-        tries: &["text in quotes"],
-    },
-    Mistake {
-        what: "scene of an unknown rig",
-        made: |case| source(case, "synth://humanevaa?camera=C1"),
-        command: CHECK,
-        code: 4,
-        says: &["synth://humanevaa", "is not a rig"],
-        tries: &["expected humaneva, umpm, ring"],
-    },
+    oops(
+        "number of a webcam without quotes",
+        |fixture| fixture.edit("deployment.toml", "source = \"b\"", "source = 0"),
+        &["deployment.toml:12", "`camera.source`", "found 0"],
+        &["text in quotes"],
+    )
+    .with(CHECK, 3),
+    oops(
+        "scene of an unknown rig",
+        |case| source(case, "synth://humanevaa?camera=C1"),
+        &["synth://humanevaa", "is not a rig"],
+        &["expected humaneva, umpm, ring"],
+    ),
 ];
 
 #[test]
 fn sources_other_than_files() {
-    check(NO_FILES);
-}
-
-const fn footage(
-    what: &'static str,
-    made: fn(&Case),
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: CHECK,
-        code: 4,
-        says,
-        tries,
-    }
+    check((CHECK, 4), NO_FILES);
 }
 
 const FOOTAGE: &[Mistake] = &[
-    footage(
+    oops(
         "absent video",
         |case| source(case, "films/b.mp4"),
         &["no such footage", "there is no folder", "camera \"b\""],
         &["relative to the deployment file"],
     ),
-    footage(
+    oops(
         "empty video",
         |case| {
             source(case, "b.mp4");
@@ -195,7 +202,7 @@ const FOOTAGE: &[Mistake] = &[
         &["b.mp4", "0 bytes"],
         &["ffprobe"],
     ),
-    footage(
+    oops(
         "video whose copying was cut off",
         |case| {
             source(case, "b.mp4");
@@ -204,96 +211,81 @@ const FOOTAGE: &[Mistake] = &[
         &["cannot decode the video", "b.mp4"],
         &["ffprobe"],
     ),
-    footage(
+    oops(
         "text",
         |case| source(case, "rig.toml"),
         &["cannot decode", "rig.toml", "camera \"b\""],
         &["check that the file is complete"],
     ),
-    footage(
+    oops(
         "pattern without a match",
         |case| source(case, "b/%04d.jpg"),
         &["no image", "b/%04d.jpg"],
         &["a folder of images, a glob"],
     ),
-    footage(
+    oops(
         "later first frame than there are",
         |case| capture(case, "start_frame = 9"),
         &["first frame 9", "2 frames"],
         &["`capture.start_frame`"],
     ),
-    Mistake {
-        what: "no ffmpeg",
-        made: |case| {
+    oops(
+        "no ffmpeg",
+        |case| {
             source(case, "b.mp4");
             case.write("b.mp4", "x");
         },
-        command: "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
-        code: 4,
-        says: &["cannot run ffprobe", "b.mp4"],
-        tries: &["apt-get install ffmpeg"],
-    },
-    Mistake {
-        what: "absent, and its name is not UTF-8",
-        made: NOTHING,
-        command: "detect \"$(printf '\\377.png')\"",
-        code: 4,
-        says: &["no such footage: \u{fffd}.png", "not UTF-8"],
-        tries: &["rename it"],
-    },
+        &["cannot run ffprobe", "b.mp4"],
+        &["apt-get install ffmpeg"],
+    )
+    .with(
+        "PATH=/nowhere exec \"$PARALLAX\" config check deployment.toml",
+        4,
+    ),
+    oops(
+        "absent, and its name is not UTF-8",
+        NOTHING,
+        &["no such footage: \u{fffd}.png", "not UTF-8"],
+        &["rename it"],
+    )
+    .with("detect \"$(printf '\\377.png')\"", 4),
 ];
 
 #[test]
 fn footage_with_a_misleading_name() {
-    check(FOOTAGE);
+    check((CHECK, 4), FOOTAGE);
 }
 
 /// The superuser may read everything, so the command runs in a user namespace of its own.
 const FORBIDDEN: &str = "test $(id -u) = 0 || exec \"$PARALLAX\" config check deployment.toml\n\
                          exec unshare -U \"$PARALLAX\" config check deployment.toml";
 
-const fn forbidden(
-    what: &'static str,
-    made: fn(&Case),
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: FORBIDDEN,
-        code: 4,
-        says,
-        tries,
-    }
-}
-
 const MAY_NOT: &[Mistake] = &[
-    forbidden(
+    oops(
         "folder of images",
         |case| forbid(case, "b"),
         &["cannot read", "/b", "Permission denied"],
         &["camera \"b\"", "you need permission to read it"],
     ),
-    forbidden(
+    oops(
         "rig",
         |case| forbid(case, "rig.toml"),
         &["cannot read", "rig.toml", "Permission denied"],
         &["must be able to read"],
     ),
-    forbidden(
+    oops(
         "model",
         |case| forbid(case, "model.plx"),
         &["cannot read the model file", "model.plx"],
         &["Permission denied"],
     ),
-    forbidden(
+    oops(
         "deployment",
         |case| forbid(case, "deployment.toml"),
         &["cannot read the deployment file deployment.toml"],
         &["Permission denied"],
     ),
-    forbidden(
+    oops(
         "folder above the footage",
         |case| {
             fs::create_dir(case.path("films")).unwrap();
@@ -313,5 +305,5 @@ fn unreadable_files() {
     if probe.wait().status.code() != Some(0) {
         return; // This user can read everything.
     }
-    check(MAY_NOT);
+    check((FORBIDDEN, 4), MAY_NOT);
 }

@@ -4,26 +4,10 @@ use std::fs;
 
 use crate::common::Case;
 
-use super::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check};
-
-const fn config(
-    what: &'static str,
-    made: fn(&Case),
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: CHECK,
-        code: 3,
-        says,
-        tries,
-    }
-}
+use super::mistakes::{CHECK, DRY, Mistake, NOTHING, capture, check, oops};
 
 const FILES: &[Mistake] = &[
-    config(
+    oops(
         "text for a number",
         |case| capture(case, "n_frames = \"many\""),
         &[
@@ -33,176 +17,103 @@ const FILES: &[Mistake] = &[
         ],
         &["a whole number of at least 0"],
     ),
-    Mistake {
-        what: "the rig",
-        made: NOTHING,
-        command: "config check rig.toml",
-        code: 3,
-        says: &["this is a rig file"],
-        tries: &["give the deployment file"],
-    },
-    Mistake {
-        what: "a folder",
-        made: NOTHING,
-        command: "config check a",
-        code: 4,
-        says: &["deployment file a", "is a folder"],
-        tries: &["pass the .toml file in it"],
-    },
-    Mistake {
-        what: "a picture",
-        made: NOTHING,
-        command: "config check a/0000.png",
-        code: 4,
-        says: &["a/0000.png", "not a text file"],
-        tries: &["UTF-8"],
-    },
-    Mistake {
-        what: "no file",
-        made: NOTHING,
-        command: "config check nowhere.toml",
-        code: 4,
-        says: &["nowhere.toml"],
-        tries: &["No such file"],
-    },
+    oops(
+        "the rig",
+        NOTHING,
+        &["this is a rig file"],
+        &["give the deployment file"],
+    )
+    .with("config check rig.toml", 3),
+    oops(
+        "a folder",
+        NOTHING,
+        &["deployment file a", "is a folder"],
+        &["pass the .toml file in it"],
+    )
+    .with("config check a", 4),
+    oops(
+        "a picture",
+        NOTHING,
+        &["a/0000.png", "not a text file"],
+        &["UTF-8"],
+    )
+    .with("config check a/0000.png", 4),
+    oops("no file", NOTHING, &["nowhere.toml"], &["No such file"])
+        .with("config check nowhere.toml", 4),
 ];
 
 #[test]
 fn deployment_files() {
-    check(FILES);
-}
-
-const fn usage(
-    what: &'static str,
-    command: &'static str,
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made: NOTHING,
-        command,
-        code: 2,
-        says,
-        tries,
-    }
+    check((CHECK, 3), FILES);
 }
 
 const LINES: &[Mistake] = &[
-    usage(
-        "slip in a command",
-        "rum deployment.toml",
-        &["'rum'"],
-        &["'run'"],
-    ),
-    usage(
+    oops("slip in a command", NOTHING, &["'rum'"], &["'run'"]).with("rum deployment.toml", 2),
+    oops(
         "slip in an option",
-        "run deployment.toml --dryrun",
+        NOTHING,
         &["'--dryrun'"],
         &["'--dry-run'"],
-    ),
-    usage("no file", "run", &["<CONFIG>"], &["--help"]),
-    usage(
+    )
+    .with("run deployment.toml --dryrun", 2),
+    oops("no file", NOTHING, &["<CONFIG>"], &["--help"]).with("run", 2),
+    oops(
         "nothing to check",
-        "config check",
+        NOTHING,
         &["config check"],
         &["needs a deployment file"],
-    ),
-    usage(
-        "negative budget",
-        "run deployment.toml --latency-budget-ms -3",
-        &["-3"],
-        &["not above 0"],
-    ),
-    usage(
+    )
+    .with("config check", 2),
+    oops("negative budget", NOTHING, &["-3"], &["not above 0"])
+        .with("run deployment.toml --latency-budget-ms -3", 2),
+    oops(
         "recording into a folder",
-        "record deployment.toml --out a",
+        NOTHING,
         &["/a is a folder"],
         &["run.mcap"],
-    ),
-    usage(
-        "unknown stage",
-        "replay run.mcap --from posee",
-        &["posee"],
-        &["'pose'"],
-    ),
-    Mistake {
-        what: "--set of a slip",
-        made: NOTHING,
-        command: "config check deployment.toml --set paper.wrokers=2",
-        code: 3,
-        says: &["--set", "`wrokers`"],
-        tries: &["did you mean `workers`"],
-    },
-    Mistake {
-        what: "recording into no folder",
-        made: NOTHING,
-        command: "record deployment.toml --out none/run.mcap",
-        code: 4,
-        says: &["run.mcap cannot be written", "there is no folder"],
-        tries: &["create the folder first"],
-    },
-    Mistake {
-        what: "results in the place of a file",
-        made: |fixture| fixture.write("out", ""),
-        command: "run deployment.toml",
-        code: 4,
-        says: &["cannot create the folder", "out is a file"],
-        tries: &["--out"],
-    },
-    Mistake {
-        what: "a recording that is none",
-        made: NOTHING,
-        command: "replay rig.toml --from fuse",
-        code: 4,
-        says: &["rig.toml"],
-        tries: &["not an MCAP file"],
-    },
-    Mistake {
-        what: "images in an empty folder",
-        made: |fixture| fs::create_dir(fixture.path("none")).unwrap(),
-        command: "detect none",
-        code: 4,
-        says: &["none: no image"],
-        tries: &["png, jpg, jpeg, bmp"],
-    },
+    )
+    .with("record deployment.toml --out a", 2),
+    oops("unknown stage", NOTHING, &["posee"], &["'pose'"]).with("replay run.mcap --from posee", 2),
+    oops(
+        "--set of a slip",
+        NOTHING,
+        &["--set", "`wrokers`"],
+        &["did you mean `workers`"],
+    )
+    .with("config check deployment.toml --set paper.wrokers=2", 3),
+    oops(
+        "recording into no folder",
+        NOTHING,
+        &["run.mcap cannot be written", "there is no folder"],
+        &["create the folder first"],
+    )
+    .with("record deployment.toml --out none/run.mcap", 4),
+    oops(
+        "results in the place of a file",
+        |fixture| fixture.write("out", ""),
+        &["cannot create the folder", "out is a file"],
+        &["--out"],
+    )
+    .with("run deployment.toml", 4),
+    oops(
+        "a recording that is none",
+        NOTHING,
+        &["rig.toml"],
+        &["not an MCAP file"],
+    )
+    .with("replay rig.toml --from fuse", 4),
+    oops(
+        "images in an empty folder",
+        |fixture| fs::create_dir(fixture.path("none")).unwrap(),
+        &["none: no image"],
+        &["png, jpg, jpeg, bmp"],
+    )
+    .with("detect none", 4),
 ];
 
 #[test]
 fn command_lines() {
-    check(LINES);
-}
-
-const fn input(
-    what: &'static str,
-    made: fn(&Case),
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: DRY,
-        code: 4,
-        says,
-        tries,
-    }
-}
-
-const fn rig(
-    what: &'static str,
-    made: fn(&Case),
-    says: &'static [&'static str],
-    tries: &'static [&'static str],
-) -> Mistake {
-    Mistake {
-        what,
-        made,
-        command: DRY,
-        code: 5,
-        says,
-        tries,
-    }
+    check((CHECK, 2), LINES);
 }
 
 /// Sets a network that predicts errors.
@@ -218,7 +129,7 @@ fn joints(case: &Case, file: &str) {
 }
 
 const INPUTS: &[Mistake] = &[
-    input(
+    oops(
         "absent model",
         |fixture| fixture.edit("deployment.toml", "model.plx", "person.mat"),
         &["there is no model file", "person.mat"],
@@ -227,31 +138,31 @@ const INPUTS: &[Mistake] = &[
             "parallax-lab model import",
         ],
     ),
-    input(
+    oops(
         "empty model",
         |fixture| fixture.write("model.plx", ""),
         &["model.plx is empty"],
         &["0 bytes"],
     ),
-    input(
+    oops(
         "folder for a model",
         |fixture| fixture.edit("deployment.toml", "model.plx", "a"),
         &["cannot read the model file", "/a"],
         &["is a folder, not a regular file"],
     ),
-    input(
+    oops(
         "absent network",
         |case| errors(case, "person.quality.onnx"),
         &["person.quality.onnx"],
         &["`paper.errors`", "\"shipped\""],
     ),
-    input(
+    oops(
         "model for a network",
         |case| errors(case, "model.plx"),
         &["model.plx"],
         &["not an ONNX file"],
     ),
-    input(
+    oops(
         "absent consistency",
         |fixture| {
             fixture.edit(
@@ -263,7 +174,7 @@ const INPUTS: &[Mistake] = &[
         &["person.consistency"],
         &["`paper.consistency`", "\"shipped\""],
     ),
-    input(
+    oops(
         "rig for consistency",
         |fixture| {
             fixture.edit(
@@ -275,13 +186,13 @@ const INPUTS: &[Mistake] = &[
         &["rig.toml"],
         &["not JSON"],
     ),
-    input(
+    oops(
         "absent joints",
         |case| joints(case, "person.joints"),
         &["person.joints"],
         &["`paper.joint_map`", "\"shipped\""],
     ),
-    input(
+    oops(
         "joints of another model",
         |case| {
             let file = include_str!("../../../../configs/models/person.joints");
@@ -291,25 +202,28 @@ const INPUTS: &[Mistake] = &[
         &["person.joints", "was learned with the model"],
         &["`parallax-lab train joints`"],
     ),
-    input(
+    oops(
         "rig for joints",
         |case| joints(case, "rig.toml"),
         &["rig.toml"],
         &["not JSON"],
     ),
-    input(
+    oops(
         "folder for a rig",
         |fixture| fixture.edit("deployment.toml", "rig = \"rig.toml\"", "rig = \"a\""),
         &["cannot read", "/a"],
         &["the rig must be a file"],
     ),
-    rig(
+];
+
+const RIGS: &[Mistake] = &[
+    oops(
         "empty rig",
         |fixture| fixture.write("rig.toml", ""),
         &["rig.toml", "the file has no camera"],
         &["rig.toml is empty"],
     ),
-    rig(
+    oops(
         "deployment for a rig",
         |fixture| {
             fixture.edit(
@@ -321,7 +235,7 @@ const INPUTS: &[Mistake] = &[
         &["deployment.toml"],
         &["give the file that its key `rig` names"],
     ),
-    rig(
+    oops(
         "unknown lens",
         |fixture| {
             fixture.edit(
@@ -333,7 +247,7 @@ const INPUTS: &[Mistake] = &[
         &["rig.toml", "fisheyee"],
         &["`pinhole`, `brown-conrady`, `kannala-brandt`"],
     ),
-    rig(
+    oops(
         "size as text",
         |case| super::replace_line(case, "size_px", "size_px = \"96x128\""),
         &[
@@ -343,7 +257,7 @@ const INPUTS: &[Mistake] = &[
         ],
         &["a list of 2 values"],
     ),
-    rig(
+    oops(
         "negative focal length",
         |case| super::replace_line(case, "focal_px", "focal_px = [-170.0, 170.0]"),
         &["rig.toml", "camera \"a\"", "-170"],
@@ -353,5 +267,6 @@ const INPUTS: &[Mistake] = &[
 
 #[test]
 fn models_rigs_and_related_files() {
-    check(INPUTS);
+    check((DRY, 4), INPUTS);
+    check((DRY, 5), RIGS);
 }
