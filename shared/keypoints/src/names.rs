@@ -23,94 +23,74 @@ pub const COCO_17: [&str; 17] = [
     "right ankle",
 ];
 
-/// Keypoints of Halpe with feet (`AlphaPose`, RTMPose): those of COCO, then nine more.
-pub const HALPE_26: [&str; 26] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "left shoulder",
-    "right shoulder",
-    "left elbow",
-    "right elbow",
-    "left wrist",
-    "right wrist",
-    "left hip",
-    "right hip",
-    "left knee",
-    "right knee",
-    "left ankle",
-    "right ankle",
-    "head top",
-    "neck",
-    "pelvis",
+/// Big toe, small toe and heel of the left foot, then of the right foot.
+const FEET: [&str; 6] = [
     "left big toe",
-    "right big toe",
     "left small toe",
-    "right small toe",
     "left heel",
+    "right big toe",
+    "right small toe",
     "right heel",
 ];
 
+/// Appends a list of names to another.
+const fn joined<const N: usize>(
+    first: &[&'static str],
+    second: &[&'static str],
+) -> [&'static str; N] {
+    assert!(first.len() + second.len() == N, "the number of names");
+    let mut all = [""; N];
+    let (head, tail) = all.split_at_mut(first.len());
+    head.copy_from_slice(first);
+    tail.copy_from_slice(second);
+    all
+}
+
+/// Keypoints of Halpe with feet (`AlphaPose`, RTMPose): those of COCO, then nine more.
+pub const HALPE_26: [&str; 26] = joined(
+    &COCO_17,
+    &[
+        "head top",
+        "neck",
+        "pelvis",
+        "left big toe",
+        "right big toe",
+        "left small toe",
+        "right small toe",
+        "left heel",
+        "right heel",
+    ],
+);
+
 /// Keypoints of `OpenPose`.
-pub const BODY_25: [&str; 25] = [
-    "nose",
-    "neck",
-    "right shoulder",
-    "right elbow",
-    "right wrist",
-    "left shoulder",
-    "left elbow",
-    "left wrist",
-    "pelvis",
-    "right hip",
-    "right knee",
-    "right ankle",
-    "left hip",
-    "left knee",
-    "left ankle",
-    "right eye",
-    "left eye",
-    "right ear",
-    "left ear",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
-];
+pub const BODY_25: [&str; 25] = joined(
+    &[
+        "nose",
+        "neck",
+        "right shoulder",
+        "right elbow",
+        "right wrist",
+        "left shoulder",
+        "left elbow",
+        "left wrist",
+        "pelvis",
+        "right hip",
+        "right knee",
+        "right ankle",
+        "left hip",
+        "left knee",
+        "left ankle",
+        "right eye",
+        "left eye",
+        "right ear",
+        "left ear",
+    ],
+    &FEET,
+);
 
 /// Keypoints of OpenPose's experimental model: those of COCO, then those of MPII and of feet. In files, they cannot be distinguished from
 /// [`BODY_25`].
-pub const BODY_25B: [&str; 25] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "left shoulder",
-    "right shoulder",
-    "left elbow",
-    "right elbow",
-    "left wrist",
-    "right wrist",
-    "left hip",
-    "right hip",
-    "left knee",
-    "right knee",
-    "left ankle",
-    "right ankle",
-    "neck",
-    "head top",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
-];
+pub const BODY_25B: [&str; 25] = joined(&joined::<19>(&COCO_17, &["neck", "head top"]), &FEET);
 
 /// Keypoints of OpenPose's older set, for networks that were trained on COCO.
 pub const OPENPOSE_18: [&str; 18] = [
@@ -184,31 +164,7 @@ pub const SETS: [(&str, &[&str]); 7] = [
 ];
 
 /// The first of the 133 keypoints of COCO-WholeBody: those of COCO and of the feet. The face and the hands follow them.
-pub const COCO_FEET_23: [&str; 23] = [
-    "nose",
-    "left eye",
-    "right eye",
-    "left ear",
-    "right ear",
-    "left shoulder",
-    "right shoulder",
-    "left elbow",
-    "right elbow",
-    "left wrist",
-    "right wrist",
-    "left hip",
-    "right hip",
-    "left knee",
-    "right knee",
-    "left ankle",
-    "right ankle",
-    "left big toe",
-    "left small toe",
-    "left heel",
-    "right big toe",
-    "right small toe",
-    "right heel",
-];
+pub const COCO_FEET_23: [&str; 23] = joined(&COCO_17, &FEET);
 
 /// Keypoint sets of files in which face and hands follow the body: name, the keypoints that are read, and the number of keypoints of a
 /// person.
