@@ -89,12 +89,6 @@ impl Deployment {
         own.map(|camera| camera.0).collect()
     }
 
-    /// Returns the host that a view belongs to.
-    pub fn host_of(&self, view: usize) -> Option<&Host> {
-        let name = &self.cameras.get(view)?.name;
-        self.hosts.iter().find(|host| host.views.contains(name))
-    }
-
     /// Returns true if hosts send the maps of networks, as Gaussians, together with the poses.
     pub fn maps_cross(&self) -> bool {
         self.link.carry == Carry::Poses && self.has_maps()

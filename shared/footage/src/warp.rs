@@ -178,11 +178,6 @@ impl Warp {
         })
     }
 
-    /// Returns the size of the source images.
-    pub fn source_size(&self) -> Size {
-        self.source
-    }
-
     /// Returns the size of the output images.
     pub fn output_size(&self) -> Size {
         self.output

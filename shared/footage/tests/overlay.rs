@@ -73,17 +73,6 @@ fn a_disc_is_filled_and_a_ring_is_hollow() {
 }
 
 #[test]
-fn a_box_covers_its_area_with_its_opacity() {
-    let mut canvas = black();
-    // The box extends from the middle of one pixel to the middle of another.
-    canvas.filled_box([10.0, 10.0, 20.0, 14.0], 0.5, INK);
-    assert_eq!(pixel(&canvas, 15, 12), [100, 50, 25]);
-    assert_eq!(pixel(&canvas, 10, 12), [50, 25, 13]);
-    assert_eq!(pixel(&canvas, 9, 12), [0; 3]);
-    assert!((amount(&canvas) - 20.0).abs() < 0.2, "{}", amount(&canvas));
-}
-
-#[test]
 fn the_outline_of_a_box_does_not_fill_it() {
     let mut canvas = black();
     canvas.frame([5.0, 5.0, 20.0, 15.0], 1.0, INK);
@@ -232,7 +221,6 @@ proptest! {
         canvas.disc(a, width, INK);
         canvas.ring(a, width, width, INK);
         canvas.frame([a[0], a[1], b[0], b[1]], width, INK);
-        canvas.filled_box([a[0], a[1], b[0], b[1]], 0.5, INK);
         prop_assert!(canvas == ground);
         // Text has a dark edge, so this only checks that nothing panics.
         canvas.text(a, "text", INK);

@@ -7,8 +7,6 @@ use nalgebra::Vector3;
 use crate::recorded::{Counts, Motion, Recorded, Report, median};
 use crate::track::{Absent, Estimate, Smoothed, State};
 
-/// Usual cutoff frequency for gait, in Hz.
-pub const CUTOFF_HZ: f64 = 6.0;
 /// Factor by which the cutoff frequency falls when a filter of second order is applied twice (Winter, *Biomechanics and Motor Control of
 /// Human Movement*, 4th ed., section 3.4.4.2): (sqrt(2) - 1)^(1/4).
 const TWICE: f64 = 0.802;

@@ -24,11 +24,6 @@ impl Sum {
         self.sum += other.sum;
         self.n += other.n;
     }
-
-    /// Returns the mean; `None` if there are no values.
-    pub fn mean(self) -> Option<f64> {
-        (self.n > 0.0).then(|| self.sum / self.n)
-    }
 }
 
 /// The errors of all joints at one instant.

@@ -157,11 +157,6 @@ impl ViewStep {
         &self.layout
     }
 
-    /// Returns the bounding box of all part boxes of a pose: left, top, right, bottom, in pixels of the image.
-    pub fn bounding_box(&self, pose: &Pose) -> [f64; 4] {
-        pose.bounding_box(self.solver.model(), &self.layout)
-    }
-
     /// Creates a tracker for the frames of one camera, with the settings of the step.
     pub fn tracker(&self) -> Tracker {
         Tracker::new(self.settings.track)

@@ -31,11 +31,6 @@ impl MapSettings {
         self.eps.ln() as f32
     }
 
-    /// The score of a person whose joints all have this heat and whose bones have their usual lengths.
-    pub fn score_of_heat(&self, heat: f64) -> f32 {
-        (N_JOINTS as f64 * (heat + self.eps).ln()) as f32
-    }
-
     /// The heat, 0 to 1, that corresponds to a value of evidence.
     pub fn heat(&self, evidence: f32) -> f64 {
         (f64::from(evidence).exp() - self.eps).clamp(0.0, 1.0)

@@ -174,11 +174,6 @@ impl PoseNetwork {
         &self.names
     }
 
-    /// The loaded network.
-    pub fn session(&self) -> &Session {
-        &self.session
-    }
-
     /// Width and height of the network's input, in pixels.
     pub fn size(&self) -> [usize; 2] {
         [self.card.input.width, self.card.input.height]

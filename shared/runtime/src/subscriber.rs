@@ -116,11 +116,6 @@ impl<T: Message> Subscriber<T> {
         Ok(latest)
     }
 
-    /// Returns the number of publishers, including those of dead processes until they are cleaned up.
-    pub fn n_publishers(&self) -> usize {
-        self.port.n_publishers()
-    }
-
     /// Returns the ids of the publishers, including those of dead processes until they are cleaned up. A
     /// restarted process has a new id.
     pub fn publishers(&self) -> Vec<u128> {
@@ -342,9 +337,5 @@ impl Port {
             tracing::debug!(topic = %self.topic, ?error, "cannot acknowledge a publisher");
         }
         *known = publishers;
-    }
-
-    fn n_publishers(&self) -> usize {
-        self.messages.dynamic_config().number_of_publishers()
     }
 }

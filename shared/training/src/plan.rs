@@ -30,7 +30,6 @@ impl Tree {
 pub struct Plan {
     shape: Shape,
     people: Vec<Planned>,
-    n_small: usize,
 }
 
 /// A person of the training set.
@@ -136,7 +135,6 @@ impl Plan {
         });
         Ok(Self {
             people: planned.collect(),
-            n_small: people.len() - large.len(),
             shape: Shape {
                 name: name.to_owned(),
                 part_names: tree.names.clone(),
@@ -158,11 +156,6 @@ impl Plan {
     /// Number of people to train on.
     pub fn n_people(&self) -> usize {
         self.people.len()
-    }
-
-    /// Number of people left out because they are smaller than the filters.
-    pub fn n_small(&self) -> usize {
-        self.n_small
     }
 
     /// Number of a training person in the [`Album`](crate::Album). `it` is the person's number in the plan.

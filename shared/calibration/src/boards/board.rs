@@ -126,16 +126,6 @@ impl Board {
         builtins::builtin_dictionary(self.dictionary?)
     }
 
-    /// Returns the same board with a different dictionary; `None` if the dictionary has too few markers.
-    #[must_use]
-    pub fn with_dictionary(&self, name: &'static str) -> Option<Self> {
-        let other = Self {
-            dictionary: Some(name),
-            ..self.clone()
-        };
-        other.check().is_ok().then_some(other)
-    }
-
     /// Returns the board with columns and rows swapped.
     #[must_use]
     pub fn turned(&self) -> Self {

@@ -21,8 +21,6 @@ fn views_belong_to_hosts_and_keys_lie_beside_the_file() {
     let it = parse(GOOD).unwrap();
     assert_eq!(it.fusing_host().unwrap().name, "desk");
     assert_eq!(it.views_of(&it.hosts[1]), [1]);
-    assert_eq!(it.host_of(0).unwrap().name, "desk");
-    assert_eq!(it.host_of(2), None);
     assert_eq!(it.name_on(&it.hosts[1]), "a.far");
     assert_eq!(it.link.keys.as_deref(), Some(Path::new("/d/keys")));
 }

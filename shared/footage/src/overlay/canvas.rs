@@ -152,19 +152,6 @@ impl Canvas {
         self.polyline(&corners, width, colour);
     }
 
-    /// Draws a filled box `[x1, y1, x2, y2]` from corner to corner.
-    ///
-    /// * `opacity`: from 0 (invisible) to 1 (opaque).
-    pub fn filled_box(&mut self, corners: [f64; 4], opacity: f64, colour: Colour) {
-        let [x1, y1, x2, y2] = corners;
-        let cover = |at: f64, low: f64, high: f64| {
-            ((at + 0.5).min(high) - (at - 0.5).max(low)).clamp(0.0, 1.0)
-        };
-        self.paint(grown(corners, 1.0), colour, |x, y| {
-            opacity * cover(x, x1, x2) * cover(y, y1, y2)
-        });
-    }
-
     /// Copies a picture, which must fit, with its top-left pixel at column `x`, row `y`.
     pub(super) fn put(&mut self, picture: &Self, [x, y]: [usize; 2]) {
         let rows = picture.rgb.chunks_exact(picture.size.width * 3);

@@ -39,12 +39,6 @@ impl People {
             .filter(|(_, count)| *count > 0)
             .collect()
     }
-
-    /// Adds the people and the problems of another data set.
-    pub fn append(&mut self, mut other: Self) {
-        self.people.append(&mut other.people);
-        self.problems.append(&mut other.problems);
-    }
 }
 
 /// A person with a fault.

@@ -200,11 +200,6 @@ impl SkeletonTable {
         &self.0.mirror
     }
 
-    /// Joints and weights of every part; the weights add up to 1.
-    pub fn weights(&self) -> &[Vec<(usize, f64)>] {
-        &self.0.weights
-    }
-
     /// For each joint, the joint on the other side of the body.
     pub fn joint_mirror(&self) -> &[usize] {
         &self.0.joint_mirror

@@ -140,14 +140,6 @@ impl Finding {
             (false, false) => Severity::Note,
         }
     }
-
-    /// Returns true if a wrong unit of length could be the cause of the finding.
-    pub fn is_of_unit(&self) -> bool {
-        matches!(
-            self,
-            Self::Distance { .. } | Self::OnePlace { .. } | Self::FarAway { .. }
-        )
-    }
 }
 
 impl fmt::Display for Finding {
