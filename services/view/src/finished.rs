@@ -19,10 +19,22 @@ const MOST_PIECES: usize = 600;
 
 /// A finished run.
 #[derive(Debug)]
-pub(crate) enum Finished {
-    /// Folder with the results of the run.
+pub(crate) struct Finished {
+    /// Path of the folder or of the recording.
+    name: String,
+    /// Cameras and joints of the run.
+    scene: Arc<Scene>,
+    /// Frames in ascending order.
+    frames: Vec<Frame>,
+    /// Remarks for the user.
+    notes: Vec<String>,
+    kept: Kept,
+}
+
+/// Results and pictures of a finished run.
+#[derive(Debug)]
+enum Kept {
     Folder(Folder),
-    /// Recording of the run.
     Tape(Tape),
 }
 
@@ -33,7 +45,7 @@ impl Finished {
     ///
     /// Fails if the folder has no result.
     pub(crate) fn folder(path: &Path) -> Result<Self, Failure> {
-        Folder::open(path).map(Self::Folder)
+        Folder::open(path)
     }
 
     /// Opens a recording, even if it was cut off.
@@ -42,27 +54,20 @@ impl Finished {
     ///
     /// Fails if the file is not a recording or has no result.
     pub(crate) fn tape(path: &Path) -> Result<Self, Failure> {
-        Tape::open(path).map(Self::Tape)
+        Tape::open(path)
     }
 
     /// Returns the cameras and joints of the run.
     pub(crate) fn scene(&self) -> Arc<Scene> {
-        match self {
-            Self::Folder(it) => it.scene(),
-            Self::Tape(it) => it.scene(),
-        }
+        Arc::clone(&self.scene)
     }
 
     /// Returns the first message to a page.
     pub(crate) fn hello(&self) -> Value {
-        let (frames, name, notes) = match self {
-            Self::Folder(it) => (it.frames(), it.name(), it.notes()),
-            Self::Tape(it) => (it.frames(), it.name(), it.notes()),
-        };
-        let scene = self.scene();
+        let frames = &self.frames;
         json!({
-            "type": "hello", "mode": "finished", "name": name, "scene": scene.json(),
-            "n": frames.len(), "line": pieces(frames), "notes": notes,
+            "type": "hello", "mode": "finished", "name": self.name, "scene": self.scene.json(),
+            "n": frames.len(), "line": pieces(frames), "notes": self.notes,
             "first": frames.first().map(|frame| frame.number), "last": frames.last().map(|frame| frame.number),
         })
     }
@@ -75,18 +80,22 @@ impl Finished {
     ///
     /// Fails if the frame cannot be read.
     pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
-        match self {
-            Self::Folder(it) => it.moment(at),
-            Self::Tape(it) => it.moment(at),
-        }
+        let at = at.min(self.frames.len() - 1);
+        let place = self.frames[at].place;
+        let mut moment = match &self.kept {
+            Kept::Folder(folder) => folder.moment(&self.scene, place)?,
+            Kept::Tape(tape) => tape.moment(&self.scene, place)?,
+        };
+        moment.at = Some(at);
+        Ok(moment)
     }
 
     /// Returns the picture of a view at a frame ([`crate::picture::message`]), or the last picture before it; `None` if there is no
     /// picture.
     pub(crate) fn picture(&self, frame: u64, view: usize) -> Option<Vec<u8>> {
-        match self {
-            Self::Folder(it) => it.picture(frame, view),
-            Self::Tape(it) => it.picture(frame, view),
+        match &self.kept {
+            Kept::Folder(folder) => folder.picture(frame, view),
+            Kept::Tape(tape) => tape.picture(frame, view),
         }
     }
 }

@@ -12,7 +12,7 @@ use runfiles::{FrameLine, Line as _, Missing, PersonLine, PlacedJoint, ViewLine}
 use serde::Deserialize;
 use skeleton::PARSE14;
 
-use super::Frame;
+use super::{Finished, Frame, Kept};
 use crate::moment::{Moment, Other, Seen, in_view, in_world, spread};
 use crate::picture;
 use crate::scene::Scene;
@@ -25,10 +25,6 @@ const MOST_PIXELS: u64 = 64 << 20;
 /// Folder of a run.
 #[derive(Debug)]
 pub(crate) struct Folder {
-    name: String,
-    scene: Arc<Scene>,
-    frames: Vec<Frame>,
-    notes: Vec<String>,
     poses: Mutex<File>,
     /// For each frame, the position of its first line about the views, and the number of these lines.
     views: BTreeMap<u64, (u64, usize)>,
@@ -47,7 +43,7 @@ struct Head {
 
 impl Folder {
     /// Opens the folder.
-    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path) -> Result<Finished, Failure> {
         let mut notes = Vec::new();
         let poses = open_lines(path, FrameLine::FILE, &mut notes)?.ok_or_else(|| {
             let text = format!("{} has no {}", path.display(), FrameLine::FILE);
@@ -83,52 +79,33 @@ impl Folder {
         }
         let scene = scene(path, &mut notes);
         let folders = scene.views.iter().map(|view| pictures(path, &view.name));
-        Ok(Self {
-            name: path.display().to_string(),
+        let folder = Self {
             pictures: folders.collect(),
-            scene: Arc::new(scene),
-            frames,
-            notes,
             poses: Mutex::new(poses),
             views,
             view_lines: view_lines.map(Mutex::new),
+        };
+        Ok(Finished {
+            name: path.display().to_string(),
+            scene: Arc::new(scene),
+            frames,
+            notes,
+            kept: Kept::Folder(folder),
         })
     }
 
-    /// Returns the cameras and joints of the run.
-    pub(crate) fn scene(&self) -> Arc<Scene> {
-        Arc::clone(&self.scene)
-    }
-
-    /// Returns the path of the folder.
-    pub(crate) fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    /// Returns the frames in ascending order.
-    pub(crate) fn frames(&self) -> &[Frame] {
-        &self.frames
-    }
-
-    /// Returns the remarks for the user.
-    pub(crate) fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
     /// Returns a frame.
-    pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
-        let at = at.min(self.frames.len() - 1);
-        let text = &line_at(&self.poses, self.frames[at].place, 1)?;
+    pub(crate) fn moment(&self, scene: &Scene, place: u64) -> Result<Moment, Failure> {
+        let text = &line_at(&self.poses, place, 1)?;
         let line = runfiles::lines::<FrameLine>(text).next();
         let line = line.ok_or("the line is empty").map_err(unreadable)?;
         let line = line.map_err(unreadable)?;
-        let mut moment = of_line(&self.scene, &line);
-        moment.at = Some(at);
+        let mut moment = of_line(scene, &line);
         if let Some((file, (place, n))) = self.view_lines.as_ref().zip(self.views.get(&line.frame))
         {
             let text = line_at(file, *place, *n)?;
             for it in runfiles::lines::<ViewLine>(&text).filter_map(Result::ok) {
-                see(&self.scene, &mut moment, &it);
+                see(scene, &mut moment, &it);
             }
         }
         Ok(moment)

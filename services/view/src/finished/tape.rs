@@ -11,7 +11,7 @@ use launch::recorded::{self, Settings};
 use messages::{FrameHeader, Skeletons, Status, topic};
 use recording::{Buffer, Entry, Kind, Recording};
 
-use super::Frame;
+use super::{Finished, Frame, Kept};
 use crate::moment::Moment;
 use crate::picture;
 use crate::scene::Scene;
@@ -19,11 +19,7 @@ use crate::scene::Scene;
 /// A recording.
 #[derive(Debug)]
 pub(crate) struct Tape {
-    name: String,
-    scene: Arc<Scene>,
     file: Mutex<File>,
-    frames: Vec<Frame>,
-    notes: Vec<String>,
     poses: Vec<Entry>,
     /// Pictures of every view by frame number.
     pictures: Vec<BTreeMap<u64, Entry>>,
@@ -31,7 +27,7 @@ pub(crate) struct Tape {
 
 impl Tape {
     /// Opens a recording.
-    pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path) -> Result<Finished, Failure> {
         let recording = recorded::open(path)?;
         let refused = |why: String| {
             let text = format!("{}: {why}", path.display());
@@ -68,48 +64,28 @@ impl Tape {
                 entries.filter(|entry| entry.len as usize > size_of::<FrameHeader>() + 64);
             with_pixels.filter_map(|entry| Some((entry.frame?, *entry))).collect()
         };
-        Ok(Self {
-            name: path.display().to_string(),
+        let tape = Self {
             pictures: (0..scene.views.len()).map(of_view).collect(),
-            scene: Arc::new(scene),
             file: Mutex::new(input),
+            poses,
+        };
+        Ok(Finished {
+            name: path.display().to_string(),
+            scene: Arc::new(scene),
             frames,
             notes,
-            poses,
+            kept: Kept::Tape(tape),
         })
     }
 
-    /// Returns the cameras and joints of the run.
-    pub(crate) fn scene(&self) -> Arc<Scene> {
-        Arc::clone(&self.scene)
-    }
-
-    /// Returns the path of the recording.
-    pub(crate) fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    /// Returns the frames in ascending order.
-    pub(crate) fn frames(&self) -> &[Frame] {
-        &self.frames
-    }
-
-    /// Returns the remarks for the user.
-    pub(crate) fn notes(&self) -> &[String] {
-        &self.notes
-    }
-
     /// Returns a frame.
-    pub(crate) fn moment(&self, at: usize) -> Result<Moment, Failure> {
-        let at = at.min(self.poses.len() - 1);
+    pub(crate) fn moment(&self, scene: &Scene, place: u64) -> Result<Moment, Failure> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        let message = read_pose(&mut file, &self.poses[at])?;
-        let n_joints = self.scene.joints.joints.len();
-        let checked = wire::check_skeletons(&message, self.scene.views.len(), n_joints);
+        let message = read_pose(&mut file, &self.poses[place as usize])?;
+        let n_joints = scene.joints.joints.len();
+        let checked = wire::check_skeletons(&message, scene.views.len(), n_joints);
         checked.map_err(|why| Failure::new(ExitKind::Input, why))?;
-        let mut moment = Moment::of_message(&self.scene, &message);
-        moment.at = Some(at);
-        Ok(moment)
+        Ok(Moment::of_message(scene, &message))
     }
 
     /// Returns the picture of the frame, or the last picture before it.
