@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use failure::{ExitKind, Failure, in_file, read_text};
-use inference::{Description, Session};
+use inference::{Description, RunBy, Session};
 use keypoints::{CardError, CardKind};
 
 use crate::library::Library;
@@ -36,6 +36,71 @@ pub(crate) struct OnnxFile {
     pub(crate) path: PathBuf,
     pub(crate) session: Session,
     pub(crate) card: Option<CardText>,
+}
+
+/// An ONNX file that was read, with its card if there is one.
+#[derive(Debug)]
+pub struct CardFile<C> {
+    path: PathBuf,
+    session: Session,
+    card: Option<(C, CardPlace)>,
+}
+
+impl<C> CardFile<C> {
+    /// Parses the card.
+    pub(crate) fn read(
+        file: OnnxFile,
+        parse: impl FnOnce(&str) -> Result<C, CardError>,
+    ) -> Result<Self, Failure> {
+        let OnnxFile {
+            path,
+            session,
+            card,
+        } = file;
+        let card = card.map(|card| card.read(&path, parse));
+        Ok(Self {
+            card: card.transpose()?,
+            path,
+            session,
+        })
+    }
+
+    /// Returns the description of the network's inputs and outputs.
+    pub fn description(&self) -> &Description {
+        self.session.description()
+    }
+
+    /// Returns the library that runs the network.
+    pub fn run_by(&self) -> &RunBy {
+        self.session.run_by()
+    }
+
+    /// Returns the card and the place where it was found.
+    pub fn card(&self) -> Option<&(C, CardPlace)> {
+        self.card.as_ref()
+    }
+
+    /// Combines the network and its card.
+    ///
+    /// * `kind`, `option`: kind of the network, and the option for its card, for the hint.
+    pub(crate) fn fit<T, E: Error + 'static>(
+        self,
+        (kind, option): (&str, &str),
+        make: impl FnOnce(Session, C) -> Result<T, E>,
+    ) -> Result<T, Failure> {
+        let path = &self.path;
+        let Some((card, place)) = self.card else {
+            let message = format!("{}: this {kind} has no card", path.display());
+            let hint = format!(
+                "`parallax-lab model show {}` prints the most similar card in configs/{kind}s: pass that card to {option}, or put a copy \
+                 beside the {kind} as {}; docs/networks.md explains how to write a card",
+                failure::wording::shell(path.display()),
+                path.with_extension("toml").display()
+            );
+            return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
+        };
+        make(self.session, card).map_err(|error| misfit(path, &place, &error))
+    }
 }
 
 /// The text of a card that is not parsed yet.
@@ -108,7 +173,7 @@ impl CardText {
     /// Parses the card.
     ///
     /// * `network`: file of the network that the card belongs to.
-    pub(crate) fn read<T>(
+    fn read<T>(
         self,
         network: &Path,
         parse: impl FnOnce(&str) -> Result<T, CardError>,
@@ -134,7 +199,7 @@ pub fn card_beside(network: &Path) -> Option<PathBuf> {
 }
 
 /// Returns the failure for a network that does not match its card.
-pub(crate) fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
+fn misfit(path: &Path, place: &CardPlace, error: &(dyn Error + 'static)) -> Failure {
     let message = format!(
         "{} does not match its card ({place}): {}",
         path.display(),

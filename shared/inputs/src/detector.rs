@@ -1,52 +1,26 @@
 //! Detectors of people from files: an ONNX file and its card.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use deployment::is_shipped;
-use failure::{ExitKind, Failure, in_file};
+use failure::{Failure, in_file};
 use footage::{ACCENT, Canvas, line_width};
-use inference::{Description, Session};
 use kernels::Rgb8View;
 use keypoints::{DetectorCard, PersonBox};
 use posenetwork::Detector;
 
-use crate::cards::{CardPlace, OnnxFile, misfit};
+use crate::cards::{CardFile, OnnxFile};
 use crate::library::Library;
 use crate::pictures::Picture;
 use crate::refused::refused;
 use crate::shipped::Shipped;
 
 /// A detector file that was read.
-#[derive(Debug)]
-pub struct DetectorFile {
-    path: PathBuf,
-    session: Session,
-    card: Option<(DetectorCard, CardPlace)>,
-}
+pub type DetectorFile = CardFile<DetectorCard>;
 
 impl DetectorFile {
-    pub(crate) fn of(read: OnnxFile) -> Result<Self, Failure> {
-        let OnnxFile {
-            path,
-            session,
-            card,
-        } = read;
-        let card = card.map(|card| card.read(&path, DetectorCard::parse));
-        Ok(Self {
-            card: card.transpose()?,
-            path,
-            session,
-        })
-    }
-
-    /// Returns the description of the network's inputs and outputs.
-    pub fn description(&self) -> &Description {
-        self.session.description()
-    }
-
-    /// Returns the card and the place where it was found.
-    pub fn card(&self) -> Option<&(DetectorCard, CardPlace)> {
-        self.card.as_ref()
+    pub(crate) fn of(file: OnnxFile) -> Result<Self, Failure> {
+        Self::read(file, DetectorCard::parse)
     }
 
     /// Returns the detector, after a test run on an empty picture.
@@ -55,22 +29,7 @@ impl DetectorFile {
     ///
     /// Fails if the detector has no card, or does not match its card.
     pub fn fitted(self) -> Result<Detector, Failure> {
-        let Self {
-            path,
-            session,
-            card,
-        } = self;
-        let Some((card, place)) = card else {
-            let message = format!("{}: this detector has no card", path.display());
-            let hint = format!(
-                "`parallax-lab model show {}` prints the most similar card in configs/detectors: pass that card to --detector-card, or put \
-                 a copy beside the detector as {}; docs/networks.md explains how to write a card",
-                failure::wording::shell(path.display()),
-                path.with_extension("toml").display()
-            );
-            return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
-        };
-        Detector::new(session, card).map_err(|error| misfit(&path, &place, &error))
+        self.fit(("detector", "--detector-card"), Detector::new)
     }
 }
 

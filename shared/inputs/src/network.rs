@@ -3,11 +3,10 @@
 mod drawn;
 mod nearest;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use failure::{ExitKind, Failure, OrFail as _, in_file};
 use footage::Size;
-use inference::{Description, RunBy, Session};
 use kernels::Rgb8View;
 use keypoints::Card;
 use posenetwork::{
@@ -15,7 +14,7 @@ use posenetwork::{
 };
 use serde_json::{Value, json};
 
-use crate::cards::{CardPlace, OnnxFile, misfit};
+use crate::cards::{CardFile, OnnxFile};
 use crate::library::Library;
 use crate::pictures::Picture;
 use crate::refused::refused;
@@ -23,13 +22,8 @@ use crate::refused::refused;
 pub use drawn::{limbs, sheet};
 pub use nearest::{nearest, nearest_detectors};
 
-/// An ONNX file that was read, with its card if there is one.
-#[derive(Debug)]
-pub struct NetworkFile {
-    path: PathBuf,
-    session: Session,
-    card: Option<(Card, CardPlace)>,
-}
+/// A network file that was read.
+pub type NetworkFile = CardFile<Card>;
 
 impl NetworkFile {
     /// Reads a network, and its card if there is one.
@@ -64,33 +58,8 @@ impl NetworkFile {
         Self::of(OnnxFile::built_in(name, bytes, library)?)
     }
 
-    pub(crate) fn of(read: OnnxFile) -> Result<Self, Failure> {
-        let OnnxFile {
-            path,
-            session,
-            card,
-        } = read;
-        let card = card.map(|card| card.read(&path, Card::parse));
-        Ok(Self {
-            card: card.transpose()?,
-            path,
-            session,
-        })
-    }
-
-    /// Returns the description of the network's inputs and outputs.
-    pub fn description(&self) -> &Description {
-        self.session.description()
-    }
-
-    /// Returns the library that runs the network.
-    pub fn run_by(&self) -> &RunBy {
-        self.session.run_by()
-    }
-
-    /// Returns the card and the place where it was found.
-    pub fn card(&self) -> Option<&(Card, CardPlace)> {
-        self.card.as_ref()
+    pub(crate) fn of(file: OnnxFile) -> Result<Self, Failure> {
+        Self::read(file, Card::parse)
     }
 
     /// Returns the network, after a test run on an empty picture.
@@ -99,22 +68,7 @@ impl NetworkFile {
     ///
     /// Fails if the network has no card, or does not match its card.
     pub fn fitted(self) -> Result<PoseNetwork, Failure> {
-        let Self {
-            path,
-            session,
-            card,
-        } = self;
-        let Some((card, place)) = card else {
-            let message = format!("{}: this network has no card", path.display());
-            let hint = format!(
-                "`parallax-lab model show {}` prints the most similar card in configs/networks: pass that card to --card, or put a copy \
-                 beside the network as {}; docs/networks.md explains how to write a card",
-                failure::wording::shell(path.display()),
-                path.with_extension("toml").display()
-            );
-            return Err(Failure::new(ExitKind::Input, message).with_hint(hint));
-        };
-        PoseNetwork::new(session, card).map_err(|error| misfit(&path, &place, &error))
+        self.fit(("network", "--card"), PoseNetwork::new)
     }
 }
 

@@ -2,10 +2,11 @@
 
 use std::fs;
 
+use inference::Session;
 use inference::onnx::{Network, Side};
 
 use super::*;
-use crate::cards::METADATA_KEY;
+use crate::cards::{CardPlace, METADATA_KEY};
 use crate::described::Described;
 
 const CARD: &str = r#"
