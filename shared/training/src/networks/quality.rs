@@ -7,7 +7,6 @@
 pub mod judge;
 pub mod network;
 pub mod sample;
-pub mod score;
 pub mod settings;
 pub mod store;
 pub mod task;

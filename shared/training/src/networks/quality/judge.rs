@@ -2,9 +2,9 @@
 
 use skeleton::N_PARTS;
 use statistics::Sorted;
+use statistics::score::{area_under_roc, rank_correlation};
 
 use super::sample::Sample;
-use super::score::{area, rank_correlation};
 
 /// Measures of the quality of predictions, for each part.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -55,11 +55,13 @@ impl Judgement {
             let expected: Vec<f32> = predicted[..n].iter().map(|values| values[part]).collect();
             let actual: Vec<f32> =
                 truth.iter().map(|sample| sample.errors_px[part] / sample.height_px).collect();
-            let beyond: Vec<bool> = actual.iter().map(|error| error > tau).collect();
-            let off = expected.iter().zip(&actual).map(|(a, b)| f64::from((a - b).abs()));
-            let n_beyond = beyond.iter().filter(|is_beyond| **is_beyond).count();
-            judgement.area.push(area(&expected, &beyond));
-            judgement.rank_correlation.push(rank_correlation(&expected, &actual));
+            let both = || expected.iter().zip(&actual);
+            let off = both().map(|(a, b)| f64::from((a - b).abs()));
+            let n_beyond = actual.iter().filter(|error| *error > tau).count();
+            let classed = both().map(|(a, b)| (f64::from(*a), b > tau));
+            let pairs = both().map(|(a, b)| (f64::from(*a), f64::from(*b)));
+            judgement.area.push(area_under_roc(&classed.collect::<Vec<_>>()));
+            judgement.rank_correlation.push(rank_correlation(&pairs.collect::<Vec<_>>()));
             judgement.inaccuracy.push(off.sum::<f64>() / n as f64);
             judgement.beyond.push(n_beyond as f64 / n as f64);
         }
