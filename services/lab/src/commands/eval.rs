@@ -26,6 +26,7 @@ use training::datasets::sequences::{Alignment, Sequence};
 use viewquality::{Forecaster, Network, Table};
 
 use super::judge::selection;
+use crate::commands::pool;
 use terminal::{Globals, Terminal};
 
 /// The template of the progress bar.
@@ -219,10 +220,7 @@ fn run_versions(arguments: &Arguments, globals: Globals, stop: Stop) -> Result<E
     let _claim = Claim::take(&arguments.out, "eval")?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "eval")?;
     let fusion = |sequence: &Sequence, scale: f32| {
         fusion((&config, learned.as_ref(), &model), sequence, scale)
     };

@@ -13,6 +13,7 @@ use scene::{Action, Flaws, RigChoice};
 use serde_json::json;
 use terminal::{Globals, Terminal, output};
 
+use crate::commands::pool;
 use motion::MotionArguments;
 use parse::{actions, rig, subjects};
 
@@ -223,12 +224,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     };
     create_folder(&arguments.out)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let threads = arguments.threads.map_or(0, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("synth-{i}"))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "synth")?;
     let terminal = Terminal::with_bar(globals.quiet, arguments.json, BAR);
     let done = pool.install(|| synth::write(&job, &stop, &terminal))?;
     report(arguments, globals, &done)?;

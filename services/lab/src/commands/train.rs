@@ -19,6 +19,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::person::{Job, Progress, Store};
 use training::Settings;
 
+use crate::commands::{pool, read_settings};
 use people::People;
 use terminal::{Globals, Terminal, output};
 
@@ -148,12 +149,7 @@ pub(crate) fn run(command: Command, globals: Globals) -> Result<ExitCode, Failur
         ),
         quiet: globals.quiet,
     });
-    let threads = arguments.threads.map_or(0, usize::from);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|i| format!("train-{i}"))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "train")?;
     let worker = Arc::clone(&shared);
     let done = failure::unless_stopped(&stop, move || {
         pool.install(|| work(&arguments, &settings, &worker))
@@ -174,12 +170,7 @@ struct Shared {
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
-    let mut settings = match &arguments.settings {
-        None => Settings::default(),
-        Some(file) => toml::from_str(&failure::read_text(file)?).map_err(|error| {
-            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
-        })?,
-    };
+    let mut settings: Settings = read_settings(arguments.settings.as_deref())?;
     if let Some(seed) = arguments.seed {
         settings.seed = u64::from(seed);
     }

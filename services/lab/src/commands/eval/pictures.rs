@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use failure::{ExitKind, Failure, OrFail as _, Stop};
+use failure::{ExitKind, Failure, Stop};
 use fmp::Search;
 use lab::eval::pictures;
 use lab::evaluation::{Judged, Pictures};
@@ -14,6 +14,7 @@ use training::datasets::People;
 
 use super::Arguments;
 use crate::commands::judge;
+use crate::commands::pool;
 
 /// Runs the evaluation.
 pub(super) fn run(
@@ -39,10 +40,7 @@ pub(super) fn run(
     judged::check(&model, &file)?;
     let poses = arguments.out.join("poses");
     inputs::make_folder(&poses)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "eval")?;
     let model_file = arguments.model.as_deref();
     let joints = inputs::Joints::of(&arguments.joint_map, model_file)?;
     let reader = Reader {

@@ -10,6 +10,7 @@ use lab::evaluation::FilmSettings;
 use multiview::learned::Learned;
 
 use crate::commands::eval::size;
+use crate::commands::pool;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
@@ -93,10 +94,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     )?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let bytes = inputs::model_bytes(arguments.model.as_deref())?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "train")?;
     let job = job(
         arguments,
         format!("{:016x}", formats::checksum::fnv1a(&bytes)),

@@ -10,6 +10,7 @@ use lab::joints::Learned;
 use serde_json::json;
 
 use super::marked::Marked;
+use crate::commands::pool;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
@@ -55,11 +56,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .thread_name(|i| format!("train-{i}"))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "train")?;
     let file = (!deployment::is_shipped(&arguments.model)).then_some(arguments.model.as_path());
     let model = inputs::model_or_shipped(file)?;
     lab::judged::check(&model, &arguments.model.display().to_string())?;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::commands::read_settings;
 use clap::Args;
 use failure::{ExitKind, Failure, OrFail as _};
 use serde::{Serialize, de::DeserializeOwned};
@@ -40,11 +41,7 @@ pub(super) struct Learning {
 impl Learning {
     /// Reads the settings file. Returns the defaults if no file is given.
     pub(super) fn read<T: DeserializeOwned + Default>(&self) -> Result<T, Failure> {
-        let Some(file) = &self.settings else {
-            return Ok(T::default());
-        };
-        toml::from_str(&failure::read_text(file)?)
-            .map_err(|error| Failure::new(ExitKind::Config, format!("{}: {error}", file.display())))
+        read_settings(self.settings.as_deref())
     }
 
     /// Prints settings.

@@ -11,6 +11,7 @@ use serde_json::json;
 use viewquality::orientation::Settings;
 
 use super::subjects;
+use crate::commands::pool;
 use terminal::{Globals, Terminal, output};
 
 const HELP: &str = "\
@@ -82,11 +83,7 @@ pub(crate) struct Arguments {
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, Failure> {
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .thread_name(|i| format!("train-{i}"))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "train")?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let defaults = Settings::default();
     let scenes = |n: u32, subjects: [u64; 2], seed: u64| Scenes {

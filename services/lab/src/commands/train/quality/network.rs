@@ -8,6 +8,7 @@ use failure::{ExitKind, Failure, OrFail as _};
 use training::networks::quality::network::Kind;
 use training::networks::quality::settings::Settings;
 
+use crate::commands::read_settings;
 use terminal::{Globals, output};
 
 const HELP: &str = "\
@@ -118,12 +119,7 @@ fn train(
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, Failure> {
-    let mut settings = match &arguments.settings {
-        None => Settings::default(),
-        Some(file) => toml::from_str(&failure::read_text(file)?).map_err(|error| {
-            Failure::new(ExitKind::Config, format!("{}: {error}", file.display()))
-        })?,
-    };
+    let mut settings: Settings = read_settings(arguments.settings.as_deref())?;
     if let Some(network) = arguments.network {
         settings.network = network.into();
     }

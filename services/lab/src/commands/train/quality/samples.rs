@@ -8,6 +8,7 @@ use failure::{ExitKind, Failure, OrFail as _, Stop};
 use lab::quality::{Scenes, samples};
 use viewquality::TileShape;
 
+use crate::commands::pool;
 use crate::commands::train::subjects;
 use terminal::{Globals, Terminal, output};
 
@@ -93,11 +94,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         return Err(failure);
     }
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.map_or(0, usize::from))
-        .thread_name(|i| format!("samples-{i}"))
-        .build()
-        .or_fail(ExitKind::Run)?;
+    let pool = pool(arguments.threads, "samples")?;
     let model = inputs::model_or_shipped(arguments.model.as_deref())?;
     let job = samples::Job {
         datasets: arguments.datasets.clone(),
