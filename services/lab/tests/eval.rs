@@ -41,8 +41,7 @@ fn two_people() -> Case {
     let case = Case::new("consistency", &[1; 2], PLAIN);
     let who = ["synth", "people", "--rig", "ring:3", "--subjects", "1-2"];
     let what = ["--frames", "1", "--no-masks", "--quiet"];
-    let ended = case.start(&[&who[..], &what].concat()).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&[&who[..], &what].concat()).wait().ends(0);
     case
 }
 
@@ -97,12 +96,10 @@ fn single_pictures_get_the_same_results_as_from_model_judge() {
     let people = people(&case);
     let who = [people, "--only", "2-8", "--json"];
     let judged = case.start(&[&["judge", "model.plx"], &who[..]].concat());
-    let judged = judged.wait();
-    assert_eq!(judged.status.code(), Some(0), "{}", judged.stderr);
+    let judged = judged.wait().ends(0);
     let judged: Value = serde_json::from_str(&judged.stdout).unwrap();
     let more = ["eval", "--model", "model.plx", "--out", "out"];
-    let ended = case.start(&[&more, &who[..]].concat()).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(&[&more, &who[..]].concat()).wait().ends(0);
     let mut report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let got = &mut report["pictures"][0];
     assert_eq!(got["name"], "people");
@@ -139,17 +136,14 @@ fn options_of_sequences_are_refused_for_single_pictures_and_vice_versa() {
         (&[people, people], "people is given twice"),
     ] {
         let words = [&["eval", "--model", "model.plx", "--out", "out"], words].concat();
-        let ended = case.start(&words).wait();
-        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-        assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+        case.start(&words).wait().ends(2).says(expected);
     }
 }
 
 #[test]
 fn a_report_has_every_version_and_is_continued_after_an_interruption() {
     let case = case(3, 3);
-    let ended = eval(&case, &["--oracle", "--json", "--quiet"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = eval(&case, &["--oracle", "--json", "--quiet"]).ends(0);
     let summary: Value = serde_json::from_str(&ended.stdout).unwrap();
     let versions = [
         "fmp",
@@ -170,35 +164,31 @@ fn a_report_has_every_version_and_is_continued_after_an_interruption() {
     let whole = reports(&case);
     assert!(whole[0].contains("<svg") && whole[2].contains("planted"));
 
-    let again = eval(&case, &["--oracle"]);
-    assert_eq!(again.status.code(), Some(2), "{}", again.stderr);
-    assert!(again.stderr.contains("--resume"), "{}", again.stderr);
+    eval(&case, &["--oracle"]).ends(2).says("--resume");
 
     // The file looks as it does after `kill -9`: it has one complete frame, and half of another.
     let kept = fs::read_to_string(poses(&case)).unwrap();
     let lines: Vec<&str> = kept.lines().collect();
     let half = &lines[2][..lines[2].len() / 2];
     fs::write(poses(&case), format!("{}\n{}\n{half}", lines[0], lines[1])).unwrap();
-    let resumed = eval(&case, &["--oracle", "--resume", "--threads", "1"]);
-    assert_eq!(resumed.status.code(), Some(0), "{}", resumed.stderr);
+    eval(&case, &["--oracle", "--resume", "--threads", "1"]).ends(0);
     assert_eq!(fs::read_to_string(poses(&case)).unwrap(), kept);
     assert_eq!(reports(&case), whole);
 
-    let other = eval(&case, &["--oracle", "--resume", "--candidates", "2"]);
-    assert_eq!(other.status.code(), Some(4), "{}", other.stderr);
-    assert!(other.stderr.contains("other settings"), "{}", other.stderr);
+    eval(&case, &["--oracle", "--resume", "--candidates", "2"])
+        .ends(4)
+        .says("other settings");
 }
 
 #[test]
 fn footage_that_ends_before_the_ground_truth_is_reported() {
     let case = case(2, 4);
-    let ended = eval(&case, &["--versions", "fmp"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(ended.stderr.contains("2 frames"), "{}", ended.stderr);
+    let ended = eval(&case, &["--versions", "fmp"]).ends(7);
+    ended.says("2 frames");
     assert!(ended.stdout.contains("planted walk"), "{}", ended.stdout);
     // The person in these pictures is smaller than models of people require.
     let height = "px tall in the frames of planted, but the filters need 150 to 250: use --scale 2";
-    assert!(ended.stderr.contains(height), "{}", ended.stderr);
+    ended.says(height);
 }
 
 #[test]
@@ -231,11 +221,11 @@ fn learned_consistency_does_not_depend_on_the_number_of_threads() {
     let case = two_people();
     let learned = ["1", "3"].map(|threads| {
         let out = format!("{threads}.consistency");
-        let ended = learn(
+        learn(
             &case,
             &["--out", &out, "--tries", "0", "--threads", threads],
-        );
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        )
+        .ends(0);
         fs::read(case.path(&out)).unwrap()
     });
     assert!(learned[0] == learned[1]);
@@ -271,20 +261,11 @@ fn an_unusable_consistency_file_is_refused() {
         "--out",
         "c.consistency",
     ];
-    let ended = case.start(&out).wait();
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("no subject is left"),
-        "{}",
-        ended.stderr
-    );
-    let ended = case.start(&[&out[..], &["--hold-out", "eve"]].concat()).wait();
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("no subject \"eve\""),
-        "{}",
-        ended.stderr
-    );
+    case.start(&out).wait().ends(2).says("no subject is left");
+    case.start(&[&out[..], &["--hold-out", "eve"]].concat())
+        .wait()
+        .ends(2)
+        .says("no subject \"eve\"");
 }
 
 /// Tests that take long; `cargo test -- --ignored` runs them.
@@ -296,8 +277,7 @@ mod long {
     fn consistency_between_views_is_learned_and_used() {
         let case = two_people();
         let out = ["--out", "a.consistency", "--rig", "hall", "--tries", "1"];
-        let ended = learn(&case, &[&out[..], &["--json", "--quiet"]].concat());
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let ended = learn(&case, &[&out[..], &["--json", "--quiet"]].concat()).ends(0);
         let said: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(said["learned_from"]["views"], 3, "{said}");
         assert_eq!(said["learned_from"]["held_out"], 1, "{said}");
@@ -309,7 +289,6 @@ mod long {
         );
         let used = ["eval", "people", "--scale", "0.4", "--out", "out", "--json"];
         let versions = ["--versions", "appearance", "--paper", "hall.toml"];
-        let used = case.start(&[&used[..], &versions].concat()).wait();
-        assert_eq!(used.status.code(), Some(0), "{}", used.stderr);
+        case.start(&[&used[..], &versions].concat()).wait().ends(0);
     }
 }

@@ -44,8 +44,9 @@ fn detector(score: f32) -> Network {
 /// Makes three views of a synthetic person, the networks and their cards.
 fn case(name: &str, score: f32) -> Case {
     let case = Case::new(name, &[1, 1], PLAIN);
-    let made = case.start(&["synth", "people", "--rig", "ring:3", "--frames", "2"]).wait();
-    assert_eq!(made.status.code(), Some(0), "{}", made.stderr);
+    case.start(&["synth", "people", "--rig", "ring:3", "--frames", "2"])
+        .wait()
+        .ends(0);
     case.write("net.onnx", network().file());
     case.write("net.toml", CARD);
     case.write("det.onnx", detector(score).file());
@@ -70,8 +71,7 @@ fn eval(case: &Case, more: &[&str]) -> Ended {
 #[test]
 fn every_stress_test_has_a_row_for_every_solver() {
     let case = case("eval-networks", 0.9);
-    let ended = eval(&case, &["--stress", "all", "--json"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = eval(&case, &["--stress", "all", "--json"]).ends(0);
     let rows: Vec<Value> = serde_json::from_str(ended.stdout.trim()).unwrap();
     assert_eq!(rows.len(), 7 * 4 + 1, "and one of what run gives");
     assert_eq!(rows[28]["method"], "as run");
@@ -98,8 +98,7 @@ fn every_stress_test_has_a_row_for_every_solver() {
 #[test]
 fn if_the_detector_finds_nobody_every_joint_counts_as_not_found() {
     let case = case("eval-nobody", 0.1);
-    let ended = eval(&case, &["--json"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = eval(&case, &["--json"]).ends(0);
     let rows: Vec<Value> = serde_json::from_str(ended.stdout.trim()).unwrap();
     assert!(
         rows.iter().all(|row| row["pcp3d"] == 0.0 && row["limbs_mm"] == 2000.0),
@@ -138,6 +137,7 @@ fn inputs_that_cannot_be_judged_are_refused() {
         4,
         "[1, 3, 64, 64], but the card states [1, 3, 64, 96]",
     );
-    let without = case.start(&["eval", "people", "--out", "out", "--stress", "all"]).wait();
-    assert_eq!(without.status.code(), Some(2), "{}", without.stderr);
+    case.start(&["eval", "people", "--out", "out", "--stress", "all"])
+        .wait()
+        .ends(2);
 }

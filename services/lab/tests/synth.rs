@@ -54,15 +54,13 @@ fn run(case: &Case, folder: &str, more: &[&str]) -> (Ended, String) {
 #[test]
 fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
     let case = case("synth-run");
-    let ended = synth(&case, &[&["files"], &SMALL[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&["files"], &SMALL[..]].concat()).ends(0);
     let (ended, from_files) = run(&case, "files", &[]);
     // The small test model finds no person in rendered pictures, so the run is degraded. Only the bits of the results are compared.
     assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
     assert_eq!(from_files.lines().count(), 6, "three frames of two views");
 
-    let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&["live", "--live"], &SMALL[..]].concat()).ends(0);
     assert!(!case.path("live/cameras").exists(), "no pictures");
     let truth = |folder: &str| fs::read_to_string(case.path(folder).join("truth.jsonl")).unwrap();
     assert_eq!(truth("live"), truth("files"));
@@ -76,8 +74,7 @@ fn a_written_deployment_runs_and_a_live_scene_gives_the_same_bits() {
 fn the_default_model_finds_the_person() {
     let case = case("synth-shipped");
     let three = ["--rig", "ring:3:5.5", "--frames", "1", "--no-masks"];
-    let ended = synth(&case, &[&["walk"], &three[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&["walk"], &three[..]].concat()).ends(0);
     let truth = fs::read_to_string(case.path("walk/truth.jsonl")).unwrap();
     let mut lines = truth.lines();
     let header = Header::parse(lines.next().unwrap()).unwrap();
@@ -87,8 +84,7 @@ fn the_default_model_finds_the_person() {
     let pictures: Vec<&str> = pictures.iter().map(String::as_str).collect();
     let best = ["--network", "none", "--max", "1", "--json"];
     let detect = [&["detect"], &pictures[..], &best].concat();
-    let ended = case.start(&detect).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(&detect).wait().ends(0);
     let mut n_found = 0;
     for (line, view) in ended.stdout.lines().zip(&frame.views) {
         let found: serde_json::Value = serde_json::from_str(line).unwrap();
@@ -106,8 +102,7 @@ fn a_run_with_several_people_follows_one_person_and_counts_all() {
     let case = case("synth-others");
     let crowd = ["--rig", "ring:3:5", "--subjects", "907", "--others", "1"];
     let motion = ["--actions", "boxing", "--frames", "5", "--rate", "10"];
-    let ended = synth(&case, &[&["crowd"], &crowd[..], &motion[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&["crowd"], &crowd[..], &motion[..]].concat()).ends(0);
     let file = "crowd/deployment.toml";
     case.edit(file, "synth-s907-boxing-1", &case.name);
     let sets = [
@@ -154,8 +149,7 @@ fn a_run_with_several_people_follows_one_person_and_counts_all() {
 #[test]
 fn a_live_scene_keeps_up_with_the_clock() {
     let case = case("synth-clock");
-    let ended = synth(&case, &[&["live", "--live"], &SMALL[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&["live", "--live"], &SMALL[..]].concat()).ends(0);
     // Runs until there are results, then stops.
     case.edit("live/deployment.toml", "frames=3", "frames=100000");
     let file = "live/deployment.toml";
@@ -215,8 +209,7 @@ fn the_ground_truth_is_projected_with_the_exact_rig() {
         "3",
         "--no-masks",
     ];
-    let ended = synth(&case, &[&flaws, &SMALL[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&flaws, &SMALL[..]].concat()).ends(0);
     let rig = |name: &str| {
         geometry::files::read(&case.path("flawed").join(name), &ReadOptions::default()).unwrap()
     };
@@ -257,8 +250,7 @@ fn the_output_does_not_depend_on_the_number_of_threads() {
             "--drop",
             "0.3",
         ];
-        let ended = synth(&case, &[&arguments, &SMALL[..]].concat());
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        synth(&case, &[&arguments, &SMALL[..]].concat()).ends(0);
     }
     for file in [
         "cameras/c1/000001.jpg",
@@ -283,8 +275,7 @@ fn each_sequence_has_its_own_folder_and_all_share_one_list_of_people() {
         "walking,lying",
         "--json",
     ];
-    let ended = synth(&case, &[&many, &SMALL[..]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = synth(&case, &[&many, &SMALL[..]].concat()).ends(0);
     let report: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["sequences"].as_array().unwrap().len(), 4);
     let options = training::datasets::ReadOptions {
@@ -338,11 +329,11 @@ fn truth(case: &Case, folder: &str) -> (Header, Vec<Frame>) {
 fn recorded_motion_can_be_performed_by_another_person() {
     let case = case("synth-motion");
     let first = ["first", "--live", "--rig", "ring:2", "--actions", "boxing"];
-    let ended = synth(
+    synth(
         &case,
         &[&first[..], &["--frames", "5", "--rate", "10"]].concat(),
-    );
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    )
+    .ends(0);
     case.write("My take.trc", trc(&case, "first", 10));
     let second = [
         "second",
@@ -353,8 +344,7 @@ fn recorded_motion_can_be_performed_by_another_person() {
         "--no-masks",
     ];
     let small = ["--rig", "ring:2", "--rate", "10", "--model", "model.plx"];
-    let ended = synth(&case, &[&second[..], &small].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&second[..], &small].concat()).ends(0);
     let (header, got) = truth(&case, "second");
     assert_eq!((header.subject, header.action.as_str()), (2, "my-take"));
     let recorded = truth(&case, "first").1;
@@ -385,8 +375,7 @@ fn recorded_motion_can_be_performed_by_another_person() {
 fn an_unusable_motion_recording_is_refused_with_the_right_exit_code() {
     let case = case("synth-motion-refused");
     let first = ["first", "--live", "--rig", "ring:2", "--frames", "5"];
-    let ended = synth(&case, &[&first[..], &["--rate", "10"]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    synth(&case, &[&first[..], &["--rate", "10"]].concat()).ends(0);
     case.write("My take.trc", trc(&case, "first", 10));
     let small = ["--motion", "My take.trc", "--rate", "10", "--rig", "ring:2"];
     for (more, code, words) in [

@@ -87,11 +87,7 @@ fn measuring_more_cameras_than_exist_is_refused() {
     let case = Case::new("views", &[2; 2], "");
     let (ended, _) = bench(&case, &["scale", "deployment.toml", "--views", "3"]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("the deployment has only 2 cameras"),
-        "{}",
-        ended.stderr
-    );
+    ended.says("the deployment has only 2 cameras");
 }
 
 /// Returns the number of bytes that the ports of a process have copied, from its log.

@@ -19,8 +19,7 @@ fn the_floor_is_found_from_a_walking_person_and_not_used_with_another_rig() {
     let case = sync::case(&scene, scene.rig(), 400, |_, frame| {
         frame as f64 / sync::RATE_HZ
     });
-    let ended = case.start(&["run", "deployment.toml"]).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&["run", "deployment.toml"]).wait().ends(0);
     let origin = |rig: &str| {
         let words = [
             "calibrate",
@@ -33,8 +32,7 @@ fn the_floor_is_found_from_a_walking_person_and_not_used_with_another_rig() {
         ];
         case.start(&words).wait()
     };
-    let ended = origin("rig.toml");
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    origin("rig.toml").ends(0);
     let (found, truth) = (rig(&case.path("room.toml")), rig(&case.path("rig.toml")));
     for (found, truth) in found.cameras().iter().zip(truth.cameras()) {
         // The floor of the scene is at z = 0.
@@ -47,13 +45,7 @@ fn the_floor_is_found_from_a_walking_person_and_not_used_with_another_rig() {
         "translation_metres = [0.0, ",
         "translation_metres = [1.5, ",
     );
-    let ended = origin("rig.toml");
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("does not belong to this rig"),
-        "{}",
-        ended.stderr
-    );
+    origin("rig.toml").ends(7).says("does not belong to this rig");
 }
 
 #[test]
@@ -64,17 +56,9 @@ fn a_message_says_if_the_options_differ_from_the_existing_room() {
     let ended = new("nobody=a.mp4");
     assert!(!ended.status.success(), "{}", ended.stderr);
     let ended = new("nobody=a.mp4");
-    assert!(
-        ended.stderr.contains("kept room/deployment.toml\n"),
-        "{}",
-        ended.stderr
-    );
+    ended.says("kept room/deployment.toml\n");
     let ended = new("somebody=a.mp4");
-    assert!(
-        ended.stderr.contains("differs from the file that these options"),
-        "{}",
-        ended.stderr
-    );
+    ended.says("differs from the file that these options");
 }
 
 #[test]
@@ -86,8 +70,7 @@ fn a_room_is_calibrated_from_people_step_by_step() {
         let words = [&["new", "room", "--dry-run"], &cameras[..], &rig, more].concat();
         case.start(&words).wait()
     };
-    let ended = new(&["--people", "1.8", "--sync"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = new(&["--people", "1.8", "--sync"]).ends(0);
     let lines = ended.stdout.lines();
     let steps: Vec<&str> = lines.filter(|line| line.starts_with("parallax")).collect();
     let people = "parallax calibrate people room/deployment.toml --set rig=lenses.toml --height-m 1.8 --out room/rig.toml \
@@ -104,14 +87,8 @@ fn a_room_is_calibrated_from_people_step_by_step() {
     let odd = [&["new", "room 1 #a", "--dry-run"], &cameras[..], &rig].concat();
     let ended = case.start(&odd).wait();
     let next = "next: parallax run 'room 1 #a/deployment.toml'";
-    assert!(ended.stderr.contains(next), "{}", ended.stderr);
-    let ended = new(&["--people", "18"]);
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("0.8 to 2.4 metres"),
-        "{}",
-        ended.stderr
-    );
+    ended.says(next);
+    new(&["--people", "18"]).ends(2).says("0.8 to 2.4 metres");
 }
 
 /// Tests that take long; `cargo test -- --ignored` runs them.
@@ -162,8 +139,7 @@ mod long {
         let who = ["--rig", "ring:3", "--subjects", "5", "--seed", "5"];
         let long = ["--frames", "60", "--rate", "10", "--no-masks"];
         let words = [&["synth", "room"], &who[..], &long].concat();
-        let ended = case.start(&words).wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        case.start(&words).wait().ends(0);
         write_turned(&case);
         let text = std::fs::read_to_string(case.path("room/deployment.toml")).unwrap();
         let text = text.replace("\"rig.toml\"", "\"turned.toml\"");
@@ -171,16 +147,9 @@ mod long {
 
         let right = refine(&case, "deployment", "right.toml");
         let wrong = refine(&case, "wrong", "better.toml");
-        let ended = right.wait();
-        assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
-        assert!(
-            ended.stderr.contains("keep the old rig"),
-            "{}",
-            ended.stderr
-        );
+        right.wait().ends(6).says("keep the old rig");
         assert!(!case.path("right.toml").exists());
-        let ended = wrong.wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        wrong.wait().ends(0);
 
         let truth = rig(&case.path("room/rig-exact.toml"));
         let worst = |file: &str| {

@@ -41,8 +41,7 @@ fn a_missed_limit_of_a_scenario_is_named_and_gives_exit_code_6() {
 #[test]
 fn scenarios_are_listed_and_impossible_ones_are_refused() {
     let case = Case::new("chaos-list", &[2; 2], PACED);
-    let ended = case.start(&["chaos", "--list"]).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(&["chaos", "--list"]).wait().ends(0);
     for name in [
         "kill-capture",
         "hang-fuse",
@@ -55,10 +54,10 @@ fn scenarios_are_listed_and_impossible_ones_are_refused() {
     }
     let (ended, _) = chaos(&case, "kill-quality", &[]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("no such process"), "{}", ended.stderr);
+    ended.says("no such process");
     let (ended, _) = chaos(&case, "kill-nobody", &[]);
     assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("--list"), "{}", ended.stderr);
+    ended.says("--list");
 }
 
 /// Tests that take long; `cargo test -- --ignored` runs them.

@@ -95,8 +95,7 @@ fn the_network_searches_every_box_of_the_detector() {
     assert!(head(0) > 0.9, "{line}");
 
     let more = ["--max", "1", "--overlay", "drawn"];
-    let ended = run(&case, &DETECT, &[&card[..], &more].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &DETECT, &[&card[..], &more].concat()).ends(0);
     for words in [
         "1 detection by the network; boxes by Three boxes always",
         "of score 0.90",
@@ -109,8 +108,7 @@ fn the_network_searches_every_box_of_the_detector() {
 #[test]
 fn a_card_is_found_beside_the_detector_or_inside_its_file() {
     let case = case("detector-card");
-    let ended = run(&case, &DETECT, &[]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    let ended = run(&case, &DETECT, &[]).ends(4);
     for words in ["det.onnx: this detector has no card", "--detector-card"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
@@ -128,8 +126,7 @@ fn a_card_is_found_beside_the_detector_or_inside_its_file() {
     std::fs::remove_file(case.path("det.onnx.toml")).unwrap();
     net.metadata.push(entry(&CARD.replace("[64", "").replace("width", "wide")));
     case.write("det.onnx", net.file());
-    let ended = run(&case, &DETECT, &[]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    let ended = run(&case, &DETECT, &[]).ends(4);
     for words in ["det.onnx: `parallax.card`", "wide"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
@@ -139,8 +136,7 @@ fn a_card_is_found_beside_the_detector_or_inside_its_file() {
 fn a_detector_that_finds_nobody_prints_the_expected_input_of_its_card() {
     let case = case("detector-nobody");
     case.write("det.toml", format!("least_score = 0.95{CARD}"));
-    let ended = run(&case, &DETECT, &[]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &DETECT, &[]).ends(0);
     assert!(ended.stdout.contains("0 detections"), "{}", ended.stdout);
     for words in ["finds nobody", "`least_score` = 0.95", "--box"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
@@ -164,8 +160,7 @@ fn a_detector_is_explained_by_its_card_and_its_boxes_are_drawn() {
     let case = case("detector-shown");
     let show = ["model", "show", "det.onnx", "--card", "card.toml"];
     let look = ["--image", "people.png", "--out", "boxes.png"];
-    let ended = run(&case, &show, &look);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &show, &look).ends(0);
     for words in [
         "det.onnx: a detector of people",
         "`picture` [1, 3, 64, 64]",
@@ -193,8 +188,7 @@ fn a_detector_is_explained_by_its_card_and_its_boxes_are_drawn() {
     assert_eq!(shown["boxes"].as_array().unwrap().len(), 2);
     assert!(shown["misfit"].is_null(), "{shown}");
     let boxed = [&look[..], &["--box", "0,0,9,9"]].concat();
-    let ended = run(&case, &show, &boxed);
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    run(&case, &show, &boxed).ends(2);
 
     let shown = parsed(&run(&case, &["model", "show", "det.onnx", "--json"], &[]));
     assert_eq!(shown["nearest_detector_cards"], json!(["rtmdet-person"]));
@@ -229,10 +223,9 @@ fn a_detector_that_does_not_match_its_card_is_refused_with_the_numbers() {
         }
     }
     // The card belongs to a network that finds keypoints.
-    let ended = run(&case, &DETECT, &["--detector-card", "net.toml"]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    let ended = run(&case, &DETECT, &["--detector-card", "net.toml"]).ends(4);
     let said = "`parallax-keypoint-network` version 1, expected `parallax-detector` version 1";
-    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    ended.says(said);
     // Options that cannot be combined with a detector.
     for more in [
         &["--threshold", "0"][..],
@@ -247,8 +240,7 @@ fn a_detector_that_does_not_match_its_card_is_refused_with_the_numbers() {
         assert_eq!(ended.status.code(), Some(2), "{more:?}: {}", ended.stderr);
     }
     let filters = ["--detector", "det.onnx", "--network", "none"];
-    let ended = run(&case, &["detect", "people.png"], &filters);
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    run(&case, &["detect", "people.png"], &filters).ends(2);
 }
 
 #[test]
@@ -267,5 +259,5 @@ fn a_card_with_another_number_type_than_the_detector_is_refused() {
     let ended = run(&case, &show, &[]);
     assert_eq!(ended.status.code(), Some(4), "{}", ended.stdout);
     let said = "det.onnx does not match its card (det.toml)";
-    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    ended.says(said);
 }

@@ -43,8 +43,7 @@ mod long {
         let case = Case::new("entering", &[1, 1], "");
         let who = ["--rig", "ring:4", "--subjects", "907", "--seed", "12"];
         let frames = ["--frames", &N_FRAMES.to_string(), "--rate", "10"];
-        let ended = case.start(&[&["synth", "room"], &who[..], &frames].concat()).wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        case.start(&[&["synth", "room"], &who[..], &frames].concat()).wait().ends(0);
         for camera in ["c1", "c2", "c3", "c4"] {
             let empty = empty_room(&case, camera);
             for frame in (0..N_FRAMES).filter(|i| !THERE.contains(i)) {

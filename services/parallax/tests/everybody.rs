@@ -96,8 +96,7 @@ fn three_people_keep_their_ids_if_any_process_is_killed() {
         assert!(processes(case.folder()).len() > 4);
         signal("KILL", started.pid_of(victim).into());
     }
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    started.wait().ends(7);
     case.assert_nothing_left();
     let ids = ids(&case.lines("pose3d.jsonl"));
     for person in 0..N_PEOPLE {

@@ -29,8 +29,7 @@ fn exported(case: &Case, source: &str, more: &[&str]) -> Ended {
 }
 
 fn done(case: &Case, source: &str, more: &[&str]) -> Value {
-    let ended = exported(case, source, &[more, &["--json"]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = exported(case, source, &[more, &["--json"]].concat()).ends(0);
     serde_json::from_str(&ended.stdout).unwrap()
 }
 
@@ -50,13 +49,10 @@ fn found(case: &Case) -> Vec<Vec<Option<[f64; 3]>>> {
 #[test]
 fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     let case = Case::new("export", &[N_FRAMES; 2], PLAIN);
-    let ended = case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&["record", "deployment.toml", "--out", "run.mcap"]).wait().ends(0);
 
     // The rate of the pictures is not known.
-    let ended = exported(&case, "out", &["--to", ALL]);
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("--rate 30"), "{}", ended.stderr);
+    exported(&case, "out", &["--to", ALL]).ends(2).says("--rate 30");
     let all = if cfg!(feature = "parquet") {
         format!("{ALL},parquet")
     } else {
@@ -75,17 +71,13 @@ fn a_run_is_exported_from_its_folder_and_from_its_recording() {
     check_with_python(&case);
     check_with_validator(&case.path("out/export"));
 
-    let ended = exported(&case, "out", &told);
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("--force"), "{}", ended.stderr);
+    exported(&case, "out", &told).ends(2).says("--force");
 
     check_videos(&case);
 
     let whole = fs::read(case.path("run.mcap")).unwrap();
     case.write("cut.mcap", &whole[..whole.len() * 2 / 3]);
-    let ended = exported(&case, "cut.mcap", &["--to", "csv"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(ended.stderr.contains("cut off"), "{}", ended.stderr);
+    exported(&case, "cut.mcap", &["--to", "csv"]).ends(7).says("cut off");
 }
 
 /// Checks the positions in C3D (millimetres) and TRC (metres) against the run, with the readers of this workspace.
@@ -237,8 +229,7 @@ fn other_programs_can_open_exports_with_gaps_and_long_exports() {
 #[test]
 fn the_files_for_opensim_name_the_same_markers_and_leave_other_files_in_the_folder() {
     let case = Case::new("export-opensim", &[2; 2], PLAIN);
-    let ended = case.start(&["run", "deployment.toml"]).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&["run", "deployment.toml"]).wait().ends(0);
     assert!(
         !case.path("out/pose3d.trc").exists(),
         "nothing tells its rate"
@@ -334,11 +325,7 @@ fn check_videos(case: &Case) {
         }
     }
     done(case, "run.mcap", &told);
-    let ended = exported(case, "out", &[&told[..], &["--force"]].concat());
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("no pictures to draw on"),
-        "{}",
-        ended.stderr
-    );
+    exported(case, "out", &[&told[..], &["--force"]].concat())
+        .ends(4)
+        .says("no pictures to draw on");
 }

@@ -281,7 +281,7 @@ mod long {
         assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
         let report: Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(report["given_up"], json!(["pose-1"]), "{}", ended.stderr);
-        assert!(ended.stderr.contains("model.plx"), "{}", ended.stderr);
+        ended.says("model.plx");
         let last = case.lines("pose3d.jsonl").pop().unwrap();
         assert_eq!(
             last["frame"],

@@ -33,7 +33,7 @@ fn a_full_disk_ends_no_process_and_unwritten_results_are_counted() {
     assert!(summary["writes_failed"].as_u64() > Some(10), "{summary:#}");
     let why = summary["first_failure"].as_str().unwrap();
     assert!(why.contains("No space left"), "{why}");
-    assert!(ended.stderr.contains("No space left"), "{}", ended.stderr);
+    ended.says("No space left");
     // Every written line is complete, and a file that lacks lines keeps its temporary name.
     for name in ["pose3d.jsonl.part", "pose2d.jsonl.part"] {
         let text = fs::read_to_string(case.path("copy").join(name)).unwrap();
@@ -58,8 +58,7 @@ fn too_little_shared_memory_is_refused_with_the_numbers() {
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let ended = started.wait().ends(3);
     for words in [
         "MB of shared memory",
         "4 MB are free in /dev/shm",

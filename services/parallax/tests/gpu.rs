@@ -16,10 +16,9 @@ fn a_gpu_that_this_build_cannot_use_is_refused_before_anything_starts() {
     if gpu::IS_BUILT {
         return;
     }
-    let ended = case("no-gpu", "gpu").run();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let ended = case("no-gpu", "gpu").run().ends(3);
     let advice = "build it with --features gpu";
-    assert!(ended.stderr.contains(advice), "{}", ended.stderr);
+    ended.says(advice);
 }
 
 #[cfg(feature = "gpu")]
@@ -31,7 +30,7 @@ fn a_run_on_software_vulkan_finds_the_poses_of_a_run_on_the_processor() {
     let runs = ["software", "cpu"].map(|device| {
         let case = case(device, device);
         let ended = case.run();
-        assert!(ended.stderr.contains("device: "), "{}", ended.stderr);
+        ended.says("device: ");
         let summary: serde_json::Value = serde_json::from_str(&ended.stdout).unwrap();
         assert_eq!(
             summary["without_gpu"],

@@ -20,8 +20,7 @@ const PROCESSES: [&str; 7] = [
 /// Returns the processes of a running case from `status`.
 fn processes(case: &Case) -> Vec<Value> {
     let ended = case.start(&["status", &case.name, "--json"]);
-    let ended = ended.wait_among_others();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = ended.wait_among_others().ends(0);
     let told: Value = serde_json::from_str(&ended.stdout).unwrap();
     told["deployment"]["processes"].as_array().unwrap().clone()
 }
@@ -84,8 +83,7 @@ fn every_process_and_view_of_a_run_is_shown_with_rates_and_times() {
     assert!(whole["p50_ms"].as_f64() > computing["p50_ms"].as_f64());
 
     let top = case.start(&["top", "deployment.toml", "--once"]);
-    let top = top.wait_among_others();
-    assert_eq!(top.status.code(), Some(0), "{}", top.stderr);
+    let top = top.wait_among_others().ends(0);
     for name in PROCESSES {
         let lines = top.stdout.lines().filter(|line| line.starts_with(name));
         assert_eq!(lines.count(), 2, "{name}: {}", top.stdout);
@@ -159,10 +157,9 @@ fn a_process_that_was_killed_is_shown_with_its_restart() {
 fn watching_a_deployment_that_does_not_run_is_refused() {
     let case = Case::new("absent", &[1], "");
     for arguments in [["status", &case.name], ["top", "deployment.toml"]] {
-        let ended = case.start(&arguments).wait();
-        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-        assert!(ended.stderr.contains(&case.name), "{}", ended.stderr);
-        assert!(ended.stderr.contains("does not run"), "{}", ended.stderr);
+        let ended = case.start(&arguments).wait().ends(2);
+        ended.says(&case.name);
+        ended.says("does not run");
     }
 }
 
@@ -176,8 +173,7 @@ fn budgeted(case: &Case, budget: &str) -> Ended {
 #[test]
 fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stages() {
     let case = Case::new("budget", &[6; 2], PLAIN);
-    let ended = budgeted(&case, "0.001");
-    assert_eq!(ended.status.code(), Some(6), "{}", ended.stderr);
+    let ended = budgeted(&case, "0.001").ends(6);
     for said in [
         "latency budget of 0.001 ms exceeded",
         "p99.9",
@@ -200,8 +196,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stage
     // The last heartbeat is sent at the end, so it counts all frames.
     assert_eq!(report["processes"]["results"]["sent"], 6);
 
-    let ended = budgeted(&case, "600000");
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = budgeted(&case, "600000").ends(0);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["latency_budget"]["held"], true);
     assert_eq!(report["latency_budget"]["frames"], 6);
@@ -211,13 +206,7 @@ fn a_run_that_misses_its_latency_budget_fails_and_reports_the_times_of_its_stage
 fn an_invalid_latency_budget_is_refused() {
     let case = Case::new("no-budget", &[1; 2], PLAIN);
     for wrong in ["0", "nan", "-5", "fast"] {
-        let ended = budgeted(&case, wrong);
-        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-        assert!(
-            ended.stderr.contains("--latency-budget-ms"),
-            "{}",
-            ended.stderr
-        );
+        budgeted(&case, wrong).ends(2).says("--latency-budget-ms");
     }
     let set = [
         "run",
@@ -225,7 +214,5 @@ fn an_invalid_latency_budget_is_refused() {
         "--set",
         "supervise.latency_budget_ms=0",
     ];
-    let ended = case.start(&set).wait();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    assert!(ended.stderr.contains("above 0"), "{}", ended.stderr);
+    case.start(&set).wait().ends(3).says("above 0");
 }

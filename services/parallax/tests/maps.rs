@@ -224,8 +224,7 @@ fn all_are_near(case: &Case, metres: f64) {
 fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
     let case = case("maps", [Some(as_it_is as Named); 4]);
     let searched = |more: &[&str]| {
-        let ended = run(&case, more);
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        run(&case, more).ends(0);
         all_are_near(&case, NEAR_M);
         let lines = std::fs::read_to_string(case.path("out/pose2d.jsonl")).unwrap();
         ["full", "tracked"].map(|name| lines.matches(&format!("\"search\":\"{name}\"")).count())
@@ -240,8 +239,7 @@ fn a_network_and_a_detector_are_all_that_a_deployment_needs() {
 fn a_view_with_swapped_left_and_right_is_corrected() {
     let right = Some(as_it_is as Named);
     let case = case("sides", [right, right, Some(exchanged), right]);
-    let ended = run(&case, &[]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(&case, &[]).ends(0);
     all_are_near(&case, NEAR_M);
 }
 
@@ -264,8 +262,7 @@ fn two_swapped_cameras_are_detected() {
 fn only_the_joint_that_a_single_view_shows_is_missing() {
     let hidden = Some(without_a_wrist as Named);
     let case = case("wrist", [Some(as_it_is), hidden, hidden, hidden]);
-    let ended = run(&case, &[]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(&case, &[]).ends(0);
     let text = std::fs::read_to_string(case.path("out/pose3d.jsonl")).unwrap();
     for line in text.lines() {
         let line: Value = serde_json::from_str(line).unwrap();
@@ -285,8 +282,7 @@ fn only_the_joint_that_a_single_view_shows_is_missing() {
 fn a_view_without_people_is_listed_with_a_reason() {
     let right = Some(as_it_is as Named);
     let case = case("nobody", [right, None, right, right]);
-    let ended = run(&case, &["--json"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(&case, &["--json"]).ends(0);
     all_are_near(&case, NEAR_M);
     let text = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
@@ -300,8 +296,8 @@ fn a_network_with_non_numeric_output_is_refused_before_the_start() {
     case.write("net.onnx", network(f32::NAN).file());
     let ended = run(&case, &[]);
     assert_ne!(ended.status.code(), Some(0));
-    assert!(ended.stderr.contains("net.onnx"), "{}", ended.stderr);
-    assert!(ended.stderr.contains("maps"), "{}", ended.stderr);
+    ended.says("net.onnx");
+    ended.says("maps");
 }
 
 #[test]
@@ -408,13 +404,12 @@ fn with_skewed_keypoints(
 fn keypoint_files_replace_videos_and_a_damaged_file_loses_one_view_of_one_frame() {
     let case = case("json", [Some(as_it_is as Named); 4]);
     with_keypoints(&case, "lsp-14", |_| LSP_14.map(str::to_owned).to_vec());
-    let ended = run(&case, &[]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(&case, &[]).ends(0);
     all_are_near(&case, NEAR_M);
     let damaged = case.path("c2").join("c2_000000000005_keypoints.json");
     std::fs::write(damaged, "{\"people\":[{\"pose_keypoints_2d\":[1,2").unwrap();
     let ended = run(&case, &[]);
-    assert!(ended.stderr.contains("c2_000000000005"), "{}", ended.stderr);
+    ended.says("c2_000000000005");
     all_are_near(&case, NEAR_M);
     let text = std::fs::read_to_string(case.path("out/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
@@ -434,8 +429,7 @@ fn extra_keypoints_of_other_programs_are_written_by_name() {
     with_keypoints(&case, "halpe-26", |view| {
         HALPE_26.map(|name| named(view, name)).to_vec()
     });
-    let ended = run(&case, &[]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(&case, &[]).ends(0);
     let read = |name: &str| std::fs::read_to_string(case.path(&format!("out/{name}"))).unwrap();
     for line in read("pose3d.jsonl").lines() {
         let line: Value = serde_json::from_str(line).unwrap();
@@ -478,8 +472,7 @@ fn joints_from_pictures_with_a_skew_are_moved_to_the_instants_of_their_frames() 
     let mut errors = Vec::new();
     for skews in [[0.0; 4], [0.0, -0.48, 0.25, 0.48]] {
         with_skewed_keypoints(&case, "halpe-26", names, skews);
-        let ended = run(&case, &[]);
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        run(&case, &[]).ends(0);
         errors.push(errors_mm(&case));
     }
     let text = std::fs::read_to_string(case.path("deployment.toml")).unwrap();

@@ -74,8 +74,7 @@ fn json(ended: &Ended) -> Value {
 #[test]
 fn a_network_is_explained_by_its_card() {
     let case = case("network-shown");
-    let ended = run(&case, &["model", "show", "net.onnx", "--card", "card.toml"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &["model", "show", "net.onnx", "--card", "card.toml"]).ends(0);
     for words in [
         "`picture` [1, 3, 64, 48]",
         "`maps` [1, 3, 16, 12]",
@@ -108,26 +107,25 @@ fn the_error_for_a_missing_card_names_the_nearest_cards() {
         Side::Named("w"),
     ];
     case.write("bare.onnx", net.file());
-    let ended = run(&case, &["model", "show", "bare.onnx"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &["model", "show", "bare.onnx"]).ends(0);
     for words in ["no card", "hrnet-w32.toml", "bare.toml", "docs/networks.md"] {
         assert!(ended.stdout.contains(words), "{words}: {}", ended.stdout);
     }
     let look = ["--image", "blocks.png", "--out", "seen.png"];
-    let ended = run(
+    run(
         &case,
         &[&["model", "show", "bare.onnx"], &look[..]].concat(),
-    );
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(ended.stderr.contains("without a card"), "{}", ended.stderr);
+    )
+    .ends(4)
+    .says("without a card");
     let shown = json(&run(&case, &["model", "show", "bare.onnx", "--json"]));
     assert!(shown["card"].is_null(), "{shown}");
     // All cards with this input are listed, because none has maps of three keypoints.
     let nearest = shown["nearest_cards"].as_array().unwrap();
     assert!(nearest.contains(&Value::from("vitpose-s")), "{shown}");
-    let ended = run(&case, &["detect", "blocks.png", "--network", "bare.onnx"]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
+    run(&case, &["detect", "blocks.png", "--network", "bare.onnx"])
+        .ends(4)
+        .says("has no card");
 }
 
 #[test]
@@ -228,10 +226,10 @@ fn options_of_the_filters_are_refused_together_with_a_network() {
         let ended = run(
             &case,
             &[&detect[..], &["--card", "card.toml"], &option].concat(),
-        );
-        assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+        )
+        .ends(2);
         let said = format!("{} is an option of the filters", option[0]);
-        assert!(ended.stderr.contains(&said), "{}", ended.stderr);
+        ended.says(&said);
     }
 }
 
@@ -241,8 +239,7 @@ fn the_included_network_finds_everybody_once_and_in_the_right_place() {
     let case = Case::new("net-ships", &[1, 1], PLAIN);
     let who = ["--rig", "ring:3", "--subjects", "901", "--seed", "77"];
     let one = ["--actions", "walking", "--frames", "1"];
-    let ended = case.start(&[&["synth", "room"], &who[..], &one].concat()).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&[&["synth", "room"], &who[..], &one].concat()).wait().ends(0);
     let rig = case.path("room/rig.toml");
     let rig = geometry::files::read(&rig, &geometry::files::ReadOptions::default()).unwrap();
     let truth = std::fs::read_to_string(case.path("room/truth.jsonl")).unwrap();
@@ -305,19 +302,15 @@ fn a_network_is_judged_on_marked_people() {
     let expected = &report["expected_errors"];
     let [n, n_far] = ["joints", "off_by_half_a_head"].map(|name| expected[name].as_u64().unwrap());
     assert!(n > n_far && n <= 14, "{expected}");
-    let ended = run(&case, &[&judge[..], &card].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = run(&case, &[&judge[..], &card].concat()).ends(0);
     assert!(ended.stdout.contains("in the person's box: 1 images"));
-    let ended = run(&case, &[&judge[..], &card, &["--offsets"]].concat());
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    let ended = run(
+    run(&case, &[&judge[..], &card, &["--offsets"]].concat()).ends(2);
+    run(
         &case,
         &[&["judge", "model.plx", "people.jsonl"], &card[..]].concat(),
-    );
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    let ended = run(&case, &judge);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(ended.stderr.contains("has no card"), "{}", ended.stderr);
+    )
+    .ends(2);
+    run(&case, &judge).ends(4).says("has no card");
 }
 
 #[test]
@@ -343,9 +336,8 @@ fn an_interrupted_judge_command_ends_early() {
         let mut started = case.start(&judge);
         started.until_said("left out");
         signal("INT", started.id());
-        let ended = started.wait();
-        assert_eq!(ended.status.code(), Some(130), "{}", ended.stderr);
-        assert!(ended.stderr.contains("interrupted"), "{}", ended.stderr);
+        let ended = started.wait().ends(130);
+        ended.says("interrupted");
         assert_eq!(ended.stdout, "", "no figures of a part");
     }
 }
@@ -369,8 +361,7 @@ fn a_truncated_network_and_one_without_numeric_output_are_refused() {
         ("log.onnx", &["`maps`", "inf"]),
         ("absent.onnx", &["absent.onnx", "No such file"]),
     ] {
-        let ended = with(name);
-        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        let ended = with(name).ends(4);
         for words in words {
             assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
         }

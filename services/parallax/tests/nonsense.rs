@@ -177,14 +177,9 @@ fn impossible_deployments_are_refused_before_the_start() {
 fn a_single_camera_is_refused_with_an_alternative() {
     let case = Case::new("alone", &[2], PLAIN);
     for arguments in [CHECK, RUN, DRY] {
-        let ended = case.start(arguments).wait();
-        assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-        assert!(
-            ended.stderr.contains("one camera, \"a\""),
-            "{}",
-            ended.stderr
-        );
-        assert!(ended.stderr.contains("parallax detect"), "{}", ended.stderr);
+        let ended = case.start(arguments).wait().ends(3);
+        ended.says("one camera, \"a\"");
+        ended.says("parallax detect");
     }
 }
 
@@ -246,8 +241,7 @@ fn different_frame_rates_are_refused_with_both_numbers() {
     }
     case.edit("deployment.toml", "source = \"a\"", "source = \"a.mp4\"");
     case.edit("deployment.toml", "source = \"b\"", "source = \"b.mp4\"");
-    let ended = case.start(CHECK).wait();
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+    let ended = case.start(CHECK).wait().ends(4);
     for words in [
         "a has 30.0",
         "b 60.0",
@@ -263,17 +257,14 @@ fn different_frame_rates_are_refused_with_both_numbers() {
     }
     // If the settings give the rate, the same footage is accepted with a warning.
     let given = [CHECK, &["--set", "capture.frame_rate_hz=30"]].concat();
-    let ended = case.start(&given).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    assert!(ended.stderr.contains("frames apart"), "{}", ended.stderr);
+    case.start(&given).wait().ends(0).says("frames apart");
     // A difference of 0.1 % over two seconds is accepted.
     case.edit(
         "deployment.toml",
         "source = \"b.mp4\"",
         "source = \"c.mp4\"",
     );
-    let ended = case.start(CHECK).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(CHECK).wait().ends(0);
     assert!(!ended.stderr.contains("frames apart"), "{}", ended.stderr);
 }
 
@@ -306,14 +297,13 @@ fn an_unspecified_vertical_is_estimated_and_reported() {
     assert!(without.len() < text.lines().count());
     case.write("rig.toml", without.join("\n"));
     case.edit("deployment.toml", "upright = false", "upright = true");
-    let ended = case.start(CHECK).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(CHECK).wait().ends(0);
     // The test figure looks like a person in any direction, so only the messages are checked.
     for said in [
         "the calibration does not give the upward direction; up = [",
         "people are found with a score of",
     ] {
-        assert!(ended.stderr.contains(said), "{}", ended.stderr);
+        ended.says(said);
     }
     // If the setting is given, nothing is estimated.
     add(&case, "up = [0, 0, 1]");

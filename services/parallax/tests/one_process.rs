@@ -19,8 +19,7 @@ const AS_THEY_ARE: [&str; 2] = ["capture.mode=lossless", "capture.scale=1.0"];
 /// Runs a case with [`AS_THEY_ARE`].
 fn run_as_they_are(case: &Case) {
     let [mode, scale] = AS_THEY_ARE;
-    let ended = run(case, &["--set", mode, "--set", scale]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run(case, &["--set", mode, "--set", scale]).ends(0);
 }
 
 /// Compares the results of a run with those of the same steps in one process, bit for bit.

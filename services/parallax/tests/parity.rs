@@ -14,8 +14,7 @@ use pipeline::{EstimatorSettings, Views};
 #[test]
 fn unchanged_frames() {
     let case = Case::new("parity", &[20; 3], PLAIN);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     in_pairs().assert_same(&case, 3, 20);
 }
 
@@ -38,8 +37,7 @@ fn rotated_resized_and_distorted_frames() {
 fn the_released_energy() {
     let more = PLAIN.to_owned() + "energy = \"released\"\n";
     let case = Case::new("released", &[20; 3], &more);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     let config = deployment::paper::Config {
         energy: deployment::paper::Energy::Released,
         ..deployment::paper::Config::default()
@@ -90,8 +88,7 @@ fn switched_off(name: &str, fuse: &str, views: Views) {
         }
     }
     case.write("q.csv", table);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     let config = deployment::paper::Config {
         tau: deployment::paper::Tau::Given(vec![5.0; 26]),
         ..deployment::paper::Config::default()
@@ -135,8 +132,7 @@ const AT_ONCE: &str = "views = \"all\"\n";
 #[test]
 fn four_views_at_once() {
     let case = Case::new("at-once", &[12; 4], &format!("{PLAIN}{AT_ONCE}"));
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     at_once().assert_same(&case, 4, 12);
 }
 
@@ -144,8 +140,7 @@ fn four_views_at_once() {
 fn all_views_at_once_after_the_end_of_the_first_views_footage() {
     let more = format!("{PLAIN}{AT_ONCE}");
     let case = Case::new("at-once-less", &[5, 9, 9], &more);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    case.run().ends(7);
     let one = OneProcess {
         is_missing: Some(|frame, view| view == 0 && frame >= 5),
         ..at_once()
@@ -160,8 +155,7 @@ fn tracked_poses() {
         &[20; 3],
         &format!("{PLAIN}search = \"tracked\"\n"),
     );
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     let config: deployment::paper::Config = toml::from_str("search = \"tracked\"").unwrap();
     let one = OneProcess {
         settings: EstimatorSettings {
@@ -188,8 +182,7 @@ fn concurrent_deployments_do_not_interfere() {
     ];
     let started = cases.each_ref().map(|case| case.start(&["run", "deployment.toml"]));
     for started in started {
-        let ended = started.wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        started.wait().ends(0);
     }
     in_pairs().assert_same(&cases[0], 2, 12);
     in_pairs().assert_same(&cases[1], 3, 9);

@@ -108,8 +108,7 @@ fn a_killed_pose_process_is_restarted_and_its_gap_is_reported() {
 #[test]
 fn a_view_whose_footage_ends_early_is_missing_afterwards() {
     let case = Case::new("short", &[12, 12, 7], PLAIN);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let ended = case.run().ends(7);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(
         frames(&lines),
@@ -169,8 +168,7 @@ fn an_output_folder_belongs_to_one_run_at_a_time() {
     let out = first.path("out");
     let into = ["--out", out.to_str().unwrap()];
     let ended = second.start(&[&["run", "deployment.toml"][..], &into].concat());
-    let ended = ended.wait_among_others();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let ended = ended.wait_among_others().ends(3);
     for said in [&format!("process {}", started.id()), &first.name] {
         assert!(ended.stderr.contains(said), "{said}: {}", ended.stderr);
     }
@@ -197,10 +195,9 @@ fn results_of_an_earlier_run_are_replaced_only_when_asked_for() {
     let run = || Started::new(case.folder(), &["run", "deployment.toml"]).wait();
     assert_eq!(run().status.code(), Some(0));
     let before = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
-    let ended = run();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    let ended = run().ends(3);
     let said = "pass --force to replace them";
-    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    ended.says(said);
     let after = fs::metadata(case.path("out/pose3d.jsonl")).unwrap();
     assert_eq!(before.modified().unwrap(), after.modified().unwrap());
 }
@@ -214,15 +211,11 @@ fn a_camera_name_cannot_lead_outside_the_output_folder() {
         "name = \"b\"",
         &format!("name = {name:?}"),
     );
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
+    case.run().ends(3);
     let rig = fs::read_to_string(case.path("rig.toml")).unwrap();
     case.write("rig.toml", rig.replace("\"b\"", &format!("{name:?}")));
-    let ended = case.start(&["calib", "check", "rig.toml"]).wait();
-    assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("do not contain /"),
-        "{}",
-        ended.stderr
-    );
+    case.start(&["calib", "check", "rig.toml"])
+        .wait()
+        .ends(5)
+        .says("do not contain /");
 }

@@ -124,8 +124,7 @@ fn a_sleeping_client_does_not_affect_a_lossless_run() {
     // The held pictures were not overwritten.
     assert!(before == pixels());
     drop(held);
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    started.wait().ends(0);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(lines.len(), 160);
     assert!(lines.iter().all(|line| line["views_missing"] == serde_json::json!({})));
@@ -174,8 +173,7 @@ fn a_client_gets_no_error_from_a_series_of_short_runs() {
         })
         .unwrap();
     for _ in 0..5 {
-        let ended = case.start(&["run", "deployment.toml", "--json"]).wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        case.start(&["run", "deployment.toml", "--json"]).wait().ends(0);
     }
     is_ended.store(true, Ordering::Relaxed);
     assert_eq!(listening.join().unwrap(), 0);
@@ -189,13 +187,10 @@ fn datagrams_contain_the_joints_and_sending_them_does_not_change_the_run() {
     socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     let port = socket.local_addr().unwrap().port();
     let target = format!("udp://127.0.0.1:{port}");
-    let beyond = case.start(&["run", "deployment.toml", "--publish", "udp://192.0.2.1:9"]).wait();
-    assert_eq!(beyond.status.code(), Some(2), "{}", beyond.stderr);
-    assert!(
-        beyond.stderr.contains("--beyond-this-machine"),
-        "{}",
-        beyond.stderr
-    );
+    case.start(&["run", "deployment.toml", "--publish", "udp://192.0.2.1:9"])
+        .wait()
+        .ends(2)
+        .says("--beyond-this-machine");
     // No program listens on the other port.
     let arguments = [
         "run",
@@ -222,8 +217,7 @@ fn datagrams_contain_the_joints_and_sending_them_does_not_change_the_run() {
         }
         frames.insert(value["frame"].as_u64().unwrap());
     }
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = started.wait().ends(0);
     assert!(
         ended.stderr.contains("publish: ") && ended.stderr.contains("publishing the skeletons"),
         "{}",

@@ -72,8 +72,7 @@ fn the_service_and_the_library_predict_the_same() {
     let case = Case::new("network", &[8; 2], &more);
     let file = network(0.02).file();
     case.write("q.onnx", &file);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.run().ends(0);
     let lines = case.lines("pose2d.jsonl");
     assert_eq!(lines.len(), 16);
     let network = viewquality::Network::parse(file, N_PARTS).unwrap();
@@ -177,8 +176,7 @@ fn a_network_that_does_not_fit_is_refused_before_anything_starts() {
     let case = Case::new("unfit", &[2; 2], &more);
     let said = |file: &[u8]| {
         case.write("q.onnx", file);
-        let ended = case.start(&["config", "check", "deployment.toml"]).wait();
-        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
+        let ended = case.start(&["config", "check", "deployment.toml"]).wait().ends(4);
         ended.stderr
     };
     let mut net = network(0.02);

@@ -55,8 +55,7 @@ impl Finished {
 fn fast_stages_lose_no_frames() {
     let unhurried = PACED.replace("= 20", "= 8");
     let case = Case::new("live", &[16; 2], &format!("{LIVE}{unhurried}"));
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.run().ends(0);
     let run = Finished::new(&case, &ended);
     // On a loaded machine some frames may be late.
     assert!(run.view(0, "used") > 8, "{:#}", run.report["views"]);
@@ -69,8 +68,7 @@ fn slow_stages_process_fewer_frames_and_every_dropped_one_is_counted() {
     let hurried = PACED.replace("= 20", "= 200");
     let more = format!("{LIVE}{hurried}size = [240, 320]\n");
     let case = Case::new("slow", &[300; 3], &more);
-    let ended = case.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.run().ends(0);
     let run = Finished::new(&case, &ended);
     for view in 0..3 {
         assert!(run.view(view, "dropped") > 5, "{:#}", run.report["views"]);

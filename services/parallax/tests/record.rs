@@ -70,17 +70,12 @@ fn a_lossless_replay_from_any_stage_gives_the_same_bits() {
     }
     // Another setting gives another result, so results are computed, not copied from the recording.
     let other = ["--from", "fuse", "--out", "other", "--set"];
-    let ended = replayed(&case, &[&other[..], &["paper.alpha=0.2"]].concat());
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    replayed(&case, &[&other[..], &["paper.alpha=0.2"]].concat()).ends(0);
     let [before, after] = ["out", "other"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     assert!(before != after);
-    let ended = replayed(&case, &[&other[..], &["paper.candidates=1"]].concat());
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("the recording determines this value"),
-        "{}",
-        ended.stderr
-    );
+    replayed(&case, &[&other[..], &["paper.candidates=1"]].concat())
+        .ends(3)
+        .says("the recording determines this value");
 }
 
 #[test]
@@ -89,13 +84,9 @@ fn a_truncated_recording_is_replayed_up_to_its_end() {
     recorded(&case, &[]);
     let whole = fs::read(case.path("run.mcap")).unwrap();
     case.write("run.mcap", &whole[..whole.len() * 2 / 3]);
-    let ended = replayed(&case, &["--from", "fuse", "--out", "part"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("incomplete (cut off): read up to byte"),
-        "{}",
-        ended.stderr
-    );
+    replayed(&case, &["--from", "fuse", "--out", "part"])
+        .ends(7)
+        .says("incomplete (cut off): read up to byte");
     let [before, after] = ["out", "part"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     let same = before.lines().zip(after.lines()).take_while(|lines| lines.0 == lines.1);
     assert!(same.count() >= 2, "{before}\n{after}");
@@ -110,31 +101,18 @@ fn omitted_messages_and_existing_files_are_reported() {
     assert_eq!(topics.get("evidence/v5/0"), None);
     assert!(report["recording"]["bytes"].as_u64().unwrap() < 1_000_000);
     for (from, lacks) in [("pose", "the pixels of the frames"), ("fuse", "evidence")] {
-        let ended = replayed(&case, &["--from", from]);
-        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-        assert!(ended.stderr.contains(lacks), "{}", ended.stderr);
+        replayed(&case, &["--from", from]).ends(4).says(lacks);
     }
-    let ended = replayed(&case, &["--from", "triangulate", "--speed", "4"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    replayed(&case, &["--from", "triangulate", "--speed", "4"]).ends(0);
     let [before, after] = ["out", "run-replay"].map(|name| text(&case.path(name), "pose3d.jsonl"));
     assert_eq!(before, after);
 
     let again = ["record", "deployment.toml", "--out", "run.mcap"];
-    let ended = case.start(&again).wait();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    assert!(ended.stderr.contains("an earlier run"), "{}", ended.stderr);
+    case.start(&again).wait().ends(3).says("an earlier run");
     let elsewhere = [&again[..], &["--set", "output=other"]].concat();
-    let ended = case.start(&elsewhere).wait();
-    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
-    assert!(ended.stderr.contains("already exists"), "{}", ended.stderr);
+    case.start(&elsewhere).wait().ends(2).says("already exists");
     case.write("run.mcap", "something else");
-    let ended = replayed(&case, &[]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("not an MCAP file"),
-        "{}",
-        ended.stderr
-    );
+    replayed(&case, &[]).ends(4).says("not an MCAP file");
 }
 
 #[test]
@@ -151,11 +129,10 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
     file[at..at + 6].iter_mut().for_each(|byte| *byte ^= 0x15);
     case.write("run.mcap", &file);
 
-    let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let ended = replayed(&case, &["--from", "triangulate", "--out", "less", "--json"]).ends(7);
     let Entry { offset, chunk, .. } = entry;
     let named = format!("sightings/v1/1, frame 3, at byte {offset}, in the chunk at byte {chunk}");
-    assert!(ended.stderr.contains(&named), "{}", ended.stderr);
+    ended.says(&named);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     let expected =
         json!({ "topic": "sightings/v1/1", "frame": 3, "offset": offset, "chunk": chunk });
@@ -190,8 +167,7 @@ fn a_damaged_chunk_of_a_recording_is_reported_and_left_out() {
         }
     }
     case.write("run.mcap", &file);
-    let ended = replayed(&case, &["--from", "triangulate", "--out", "least"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    replayed(&case, &["--from", "triangulate", "--out", "least"]).ends(7);
     let least = text(&case.path("least"), "pose3d.jsonl");
     assert_eq!(least.lines().count(), N_FRAMES, "{least}");
 }

@@ -12,8 +12,7 @@ use serde_json::Value;
 
 /// Returns the deployment of a case in `status`.
 fn status(case: &Case) -> Option<Value> {
-    let ended = case.start(&["status", "--json"]).wait_among_others();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(&["status", "--json"]).wait_among_others().ends(0);
     let all: Value = serde_json::from_str(&ended.stdout).unwrap();
     let all = all["deployments"].as_array().unwrap();
     all.iter().find(|value| value["name"] == case.name).cloned()
@@ -42,11 +41,7 @@ fn a_run_is_listed_and_removed_after_it_was_killed() {
     assert!(shown["bytes"].as_u64() > Some(100_000), "{shown}");
     let refused = case.start(&["clean", &case.name]).wait_among_others();
     assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        refused.stderr.contains("already running"),
-        "{}",
-        refused.stderr
-    );
+    refused.says("already running");
 
     signal("KILL", started.id());
     let ended = started.wait_among_others();
@@ -54,8 +49,7 @@ fn a_run_is_listed_and_removed_after_it_was_killed() {
     let shown = status(&case).unwrap();
     assert_eq!(shown["supervisor"], Value::Null);
     assert!(shown["files"].as_u64() > Some(10), "{shown}");
-    let cleaned = case.start(&["clean", &case.name, "--json"]).wait();
-    assert_eq!(cleaned.status.code(), Some(0), "{}", cleaned.stderr);
+    let cleaned = case.start(&["clean", &case.name, "--json"]).wait().ends(0);
     let cleaned: Value = serde_json::from_str(&cleaned.stdout).unwrap();
     assert_eq!(cleaned["removed"][0]["name"], case.name.as_str());
     case.assert_nothing_left();
@@ -67,7 +61,7 @@ fn an_unknown_deployment_name_is_refused() {
     let case = Case::new("nothing", &[1], "");
     let ended = case.start(&["clean", &case.name]).wait();
     assert_eq!(ended.status.code(), Some(2));
-    assert!(ended.stderr.contains(&case.name), "{}", ended.stderr);
+    ended.says(&case.name);
 }
 
 #[test]

@@ -47,8 +47,7 @@ fn shared_memory_that_fills_at_the_start_of_a_run_causes_an_error_instead_of_a_s
         eprintln!("skipped: no private file system may be mounted here");
         return;
     };
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    started.wait().ends(0);
     let mut n_refused = 0;
     for nth in (1..).take_while(|nth| case.path(&format!("code-{nth}")).exists()) {
         let read = |name: &str| fs::read_to_string(case.path(&format!("{name}-{nth}"))).unwrap();
@@ -80,20 +79,18 @@ fn a_file_that_cannot_grow_is_counted_and_does_not_end_a_process() {
         set.is_ok_and(|set| set.success()),
         "prlimit belongs to util-linux"
     );
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
+    let ended = started.wait().ends(7);
     case.assert_nothing_left();
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["restarts"], json!([]), "{}", ended.stderr);
-    assert!(ended.stderr.contains("os error 27"), "{}", ended.stderr);
+    ended.says("os error 27");
 }
 
 #[test]
 fn a_file_size_limit_is_an_error_with_the_limit() {
     let case = Case::new("small", &[2; 2], PLAIN);
     let script = "ulimit -f 16; exec \"$PARALLAX\" run deployment.toml --force --json";
-    let ended = case.start_in_shell(script).wait();
-    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    let ended = case.start_in_shell(script).wait().ends(1);
     for words in ["error: ", "no file may have more than 8 KB", "ulimit -f"] {
         assert!(ended.stderr.contains(words), "{words}: {}", ended.stderr);
     }
@@ -113,8 +110,7 @@ fn files_of_a_run_are_private_for_any_umask() {
         stat -c %a /dev/shm/px-$(id -u) >base";
     let started = Started::in_mount_namespace(case.folder(), script);
     let in_own = started.is_some();
-    let ended = started.unwrap_or_else(|| case.start_in_shell(script)).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    started.unwrap_or_else(|| case.start_in_shell(script)).wait().ends(0);
     if in_own {
         let mode = fs::read_to_string(case.path("base")).unwrap();
         assert_eq!(mode.trim(), "700", "the directory that was open to all");
@@ -157,8 +153,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
         }
     }
     // Usually the run ends at once. It may also wait for a truncated file, and notice this after a minute.
-    let ended = started.wait_among_others();
-    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    let ended = started.wait_among_others().ends(1);
     let causes = ["is missing or damaged", "has not answered the supervisor"];
     let said = causes.map(|cause| format!("error: shared memory of the deployment {cause}"));
     let is_said = said.iter().any(|words| ended.stderr.contains(words));
@@ -167,8 +162,7 @@ fn truncated_shared_memory_is_reported_and_ends_no_process_by_a_signal() {
         "{}",
         ended.stderr
     );
-    let cleaned = case.start(&["clean", &case.name]).wait();
-    assert_eq!(cleaned.status.code(), Some(0), "{}", cleaned.stderr);
+    case.start(&["clean", &case.name]).wait().ends(0);
     case.assert_nothing_left();
 }
 
@@ -193,12 +187,10 @@ fn a_second_run_of_the_same_name_is_refused_and_the_first_continues() {
     first.until("five frames", |_| case.lines("pose3d.jsonl").len() >= 5);
     let id = first.id();
     let second = case.start(&["run", "deployment.toml", "--json", "--set", "output=other"]);
-    let second = second.wait_among_others();
-    assert_eq!(second.status.code(), Some(1), "{}", second.stderr);
+    let second = second.wait_among_others().ends(1);
     let said = format!("is already running (process {id})");
-    assert!(second.stderr.contains(&said), "{}", second.stderr);
-    let ended = first.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    second.says(&said);
+    first.wait().ends(0);
     case.assert_nothing_left();
 }
 

@@ -232,8 +232,7 @@ fn a_foreign_process_cannot_publish_another_type_or_compete_with_the_right_sende
     let second = rogue.bus.publisher::<Sightings>(&topic::sightings(0));
     assert!(matches!(second, Err(PortError::Publisher { .. })));
     drop(rogue);
-    let ended = started.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = started.wait().ends(0);
     let report: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(report["refused"], serde_json::json!({}));
     case.assert_nothing_left();

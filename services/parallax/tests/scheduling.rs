@@ -47,16 +47,12 @@ fn processes_run_on_their_configured_cores() {
 fn a_dry_run_shows_cores_and_priority_of_every_process() {
     let more = "[runtime]\nspin = true\ncores = { fuse = [0, 9999] }\n";
     let case = Case::new("shown", &[2; 3], more);
-    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("`runtime.cores` is 9999"),
-        "{}",
-        ended.stderr
-    );
+    case.start(&["run", "deployment.toml", "--dry-run"])
+        .wait()
+        .ends(3)
+        .says("`runtime.cores` is 9999");
     case.edit("deployment.toml", "9999", "1000");
-    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait().ends(0);
     let lines: Vec<Vec<&str>> =
         ended.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
     for expected in [
@@ -80,13 +76,10 @@ fn an_unknown_process_is_refused_by_name() {
         &[2; 2],
         "[runtime]\npriority = { pose-2 = 10 }\n",
     );
-    let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    assert_eq!(ended.status.code(), Some(3), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("`runtime.priority` is \"pose-2\""),
-        "{}",
-        ended.stderr
-    );
+    case.start(&["run", "deployment.toml", "--dry-run"])
+        .wait()
+        .ends(3)
+        .says("`runtime.priority` is \"pose-2\"");
 }
 
 /// Runs the deployment without the privileges for real-time priority and locked memory. Returns `None` if this is impossible.

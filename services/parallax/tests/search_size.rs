@@ -58,8 +58,7 @@ fn deployment(case: &Case, sizes: &[[u32; 2]], focal: f64, units_per_metre: f64)
 }
 
 fn said(case: &Case) -> String {
-    let ended = case.start(DRY).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = case.start(DRY).wait().ends(0);
     let size = ended.stdout.lines().find(|line| line.starts_with("capture.scale"));
     size.unwrap().to_owned()
 }
@@ -80,8 +79,7 @@ fn by_default_the_size_follows_from_the_calibration_in_any_unit() {
     assert_eq!(said(&case), text, "the same calibration in millimetres");
     // A setting of the user takes precedence, without a message.
     for set in ["capture.scale=0.5", "capture.size=[544,960]"] {
-        let ended = case.start(&[DRY, &["--set", set]].concat()).wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let ended = case.start(&[DRY, &["--set", set]].concat()).wait().ends(0);
         assert!(
             !ended.stdout.contains("scale is set automatically"),
             "{}",

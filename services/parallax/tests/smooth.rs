@@ -110,10 +110,8 @@ fn a_run_is_smoothed_live_and_more_accurately_afterwards() {
         ("kalman", N_FRAMES as u64)
     );
     let raw = fs::read(case.path("out/pose3d.jsonl")).unwrap();
-    let ended = smooth(&case, &["out", "--json"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
-    let ended = smooth(&case, &["out", "--truth", ".", "--json"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    smooth(&case, &["out", "--json"]).ends(0);
+    let ended = smooth(&case, &["out", "--truth", ".", "--json"]).ends(0);
     let said: Value = serde_json::from_str(&ended.stdout).unwrap();
     let rows = said["methods"].as_array().unwrap();
     let [raw_row, rts] =
@@ -201,8 +199,7 @@ fn each_of_several_people_is_smoothed_alone() {
         line
     });
     case.write("run/pose3d.jsonl", text(lines_of_two));
-    let ended = smooth(&case, &["run"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let ended = smooth(&case, &["run"]).ends(0);
     assert!(ended.stdout.contains("of 2 people"), "{}", ended.stdout);
     let smoothed = lines(&case, "run/pose3d-smooth.jsonl");
     for (frame, line) in smoothed.iter().enumerate() {
@@ -248,8 +245,7 @@ fn people_followed_one_after_the_other_are_smoothed_as_one_track() {
         line
     });
     case.write("run/pose3d.jsonl", text(lines_of_one));
-    let ended = smooth(&case, &["run"]);
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    smooth(&case, &["run"]).ends(0);
     let smoothed = lines(&case, "run/pose3d-smooth.jsonl");
     let ids = smoothed.iter().map(|line| line.people[0].id);
     assert!(ids.eq((0..50).map(|frame| 1 + u64::from(frame > 25))));

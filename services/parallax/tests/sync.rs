@@ -85,8 +85,8 @@ fn clock_offsets_are_estimated_written_and_used() {
     let ended = estimate(
         &case,
         &["--window", "1", "--out", "clocks.html", "--write", "--json"],
-    );
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    )
+    .ends(0);
     let found: Value = serde_json::from_str(&ended.stdout).unwrap();
     assert_eq!(found["is_determined"], true);
     for (camera, begin_s) in found["cameras"].as_array().unwrap().iter().zip(BEGIN_S) {
@@ -106,8 +106,7 @@ fn clock_offsets_are_estimated_written_and_used() {
         "--set",
         "capture.n_frames=6",
     ];
-    let ended = case.start(&[&["run", "deployment.toml"], &set[..]].concat()).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&[&["run", "deployment.toml"], &set[..]].concat()).wait().ends(0);
     let lines = case.lines("pose3d.jsonl");
     assert_eq!(lines.len(), 6);
     for line in lines {
@@ -128,9 +127,7 @@ fn footage_without_movement_is_refused_and_nothing_is_written() {
     let rig = scene.rig();
     let still = case(&scene, rig, N_FRAMES, |_, _| 0.5);
     let before = std::fs::read_to_string(still.path("deployment.toml")).unwrap();
-    let ended = estimate(&still, &["--window", "0.5", "--write"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(ended.stderr.contains("not determined"), "{}", ended.stderr);
+    estimate(&still, &["--window", "0.5", "--write"]).ends(7).says("not determined");
     let after = std::fs::read_to_string(still.path("deployment.toml")).unwrap();
     assert_eq!(before, after);
     for (arguments, code, words) in [
@@ -140,12 +137,10 @@ fn footage_without_movement_is_refused_and_nothing_is_written() {
     ] {
         let ended = estimate(&still, arguments);
         assert_eq!(ended.status.code(), Some(code), "{}", ended.stderr);
-        assert!(ended.stderr.contains(words), "{}", ended.stderr);
+        ended.says(words);
     }
     still.edit("deployment.toml", "\nname = \"c2\"", "\nname = \"c7\"");
-    let ended = estimate(&still, &[]);
-    assert_eq!(ended.status.code(), Some(5), "{}", ended.stderr);
-    assert!(ended.stderr.contains("c7"), "{}", ended.stderr);
+    estimate(&still, &[]).ends(5).says("c7");
 }
 
 /// Writes a video with one picture every ten seconds, and with sounds that begin at some times. Without ffmpeg, returns false with a
@@ -198,8 +193,8 @@ fn clock_offsets_are_estimated_from_the_sound_of_the_videos() {
     let ended = estimate(
         &case,
         &["--by", "sound", "--out", "clocks.html", "--write", "--json"],
-    );
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    )
+    .ends(0);
     let found: Value = serde_json::from_str(&ended.stdout).unwrap();
     for (camera, begin_s) in found["cameras"].as_array().unwrap().iter().zip(BEGIN_S) {
         let off_ms = camera["offset_ms"].as_f64().unwrap() - 1e3 * (begin_s - BEGIN_S[0]);
@@ -214,19 +209,9 @@ fn clock_offsets_are_estimated_from_the_sound_of_the_videos() {
     // One camera recorded only silence, the other has no microphone.
     video(&case, "quiet", &[], 11.0);
     case.edit("deployment.toml", "c2.mp4", "quiet.mp4");
-    let ended = estimate(&case, &["--by", "sound"]);
-    assert_eq!(ended.status.code(), Some(7), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("c2: only 0 sounds begin"),
-        "{}",
-        ended.stderr
-    );
+    estimate(&case, &["--by", "sound"]).ends(7).says("c2: only 0 sounds begin");
     case.edit("deployment.toml", "source = \"quiet.mp4\"\n", "");
-    let ended = estimate(&case, &["--by", "sound"]);
-    assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-    assert!(
-        ended.stderr.contains("\"c2\": the camera has no footage"),
-        "{}",
-        ended.stderr
-    );
+    estimate(&case, &["--by", "sound"])
+        .ends(4)
+        .says("\"c2\": the camera has no footage");
 }

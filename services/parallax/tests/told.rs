@@ -7,8 +7,7 @@ use crate::common::{Case, PLAIN};
 #[test]
 fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
     let whole = Case::new("gap-none", &[6; 3], PLAIN);
-    let ended = whole.run();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    whole.run().ends(0);
     for pattern in ["", "/%04d.png", "/*.png"] {
         let case = Case::new("gap", &[6; 3], PLAIN);
         case.edit(
@@ -22,7 +21,7 @@ fn a_gap_in_the_numbers_is_a_missing_picture_of_that_camera() {
         let ended = case.run();
         let said =
             "camera \"b\" has no picture for 2 of 6 frames: no file name has the numbers 2 to 3";
-        assert!(ended.stderr.contains(said), "{}", ended.stderr);
+        ended.says(said);
         let (lines, due) = (case.lines("pose3d.jsonl"), whole.lines("pose3d.jsonl"));
         assert_eq!(lines.len(), 6);
         for frame in [0, 1, 4, 5] {
@@ -44,15 +43,11 @@ fn cameras_that_start_with_different_numbers_are_reported() {
     fs::remove_file(case.path("b/0000.png")).unwrap();
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
     let said = "cameras do not begin with the same picture (a 0 to 5, b 1 to 5)";
-    assert!(ended.stderr.contains(said), "{}", ended.stderr);
+    ended.says(said);
     for nth in (1..6).rev() {
         let [from, to] = [nth, nth + 1000].map(|i| case.path(&format!("b/{i:04}.png")));
         fs::rename(from, to).unwrap();
     }
     let ended = case.start(&["run", "deployment.toml", "--dry-run"]).wait();
-    assert!(
-        ended.stderr.contains("are numbered separately"),
-        "{}",
-        ended.stderr
-    );
+    ended.says("are numbered separately");
 }

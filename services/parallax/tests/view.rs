@@ -69,8 +69,7 @@ impl View {
 
     fn end(self) {
         signal("TERM", self.started.id());
-        let ended = self.started.wait_among_others();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        self.started.wait_among_others().ends(0);
     }
 }
 
@@ -146,8 +145,7 @@ fn a_page_follows_a_run_from_before_its_start_until_after_its_end() {
     page.text("event", is_kept);
     page.text("hello", |value| value["mode"] == "waiting");
     view.end();
-    let ended = run.wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    run.wait().ends(0);
     case.assert_nothing_left();
     finished(&case);
 }

@@ -51,21 +51,17 @@ fn included_files_are_found_from_any_program_location() {
         "workers = 2\nconsistency = \"shipped\"\ntau = \"learned\"\nerrors = \"shipped\"",
     );
     let check = ["config", "check", "deployment.toml"];
-    let ended = case.start(&check).wait();
-    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    case.start(&check).wait().ends(0);
     // A path is used as a path, even if it looks like a name.
     for (from, to) in [
         ("errors = \"shipped\"", "errors = \"./shipped\""),
         ("\"./shipped\"", "\"a/shipped\""),
     ] {
         case.edit("deployment.toml", from, to);
-        let ended = case.start(&["config", "check", "deployment.toml"]).wait();
-        assert_eq!(ended.status.code(), Some(4), "{}", ended.stderr);
-        assert!(
-            ended.stderr.contains("/shipped: No such file"),
-            "{}",
-            ended.stderr
-        );
+        case.start(&["config", "check", "deployment.toml"])
+            .wait()
+            .ends(4)
+            .says("/shipped: No such file");
     }
 }
 
@@ -74,8 +70,10 @@ fn padding_is_reported_with_a_size_that_avoids_it() {
     let case = Case::new("oops-pad", &[2; 2], PLAIN);
     let said = |size: &str| {
         let set = format!("capture.size={size}");
-        let ended = case.start(&["config", "check", "deployment.toml", "--set", &set]).wait();
-        assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+        let ended = case
+            .start(&["config", "check", "deployment.toml", "--set", &set])
+            .wait()
+            .ends(0);
         ended.stderr
     };
     // The pictures have 96x128 pixels.
@@ -97,11 +95,7 @@ fn the_announced_size_of_a_recording_is_correct() {
     case.assert_nothing_left();
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     let line = ended.stderr.lines().find(|line| line.starts_with("recording ")).unwrap();
-    assert!(
-        ended.stderr.contains("--without evidence: "),
-        "{}",
-        ended.stderr
-    );
+    ended.says("--without evidence: ");
     assert!(line.contains(" for all 4 frames; "), "{line}");
     // The predicted size is not smaller than the actual size, and not many times larger.
     let number = |before: &str| -> f64 {
