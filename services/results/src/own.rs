@@ -188,14 +188,6 @@ mod tests {
         };
         let mut record = record(0);
         let camera = scene.views[0].framing.camera().clone();
-        let person = |id: u64, x: f64| {
-            let mut person = crate::testing::skeletons(0).people[0];
-            (person.id, person.n_joints) = (id, 14);
-            for joint in &mut person.joints[..14] {
-                joint.in_world = [x, 0.0, 0.0];
-            }
-            person
-        };
         let seen = |x: f64| {
             let at = camera.project(&[x, 0.0, 0.0].into()).unwrap();
             pipeline::Sighting {
@@ -210,7 +202,11 @@ mod tests {
         };
         let mut set = |xs: [f64; 2], seen_at: &[f64]| {
             record.skeletons.n_people = 2;
-            record.skeletons.people[..2].copy_from_slice(&[person(1, xs[0]), person(2, xs[1])]);
+            for ((person, id), x) in record.skeletons.people.iter_mut().zip(1..).zip(xs) {
+                *person = crate::testing::skeletons(0).people[0];
+                person.id = id;
+                person.joints.iter_mut().for_each(|joint| joint.in_world = [x, 0.0, 0.0]);
+            }
             let seen: Vec<_> = seen_at.iter().copied().map(seen).collect();
             record.views[0].pose = wire::sightings_to_message(&seen, 0, [80, 60]).ok();
             record.clone()
