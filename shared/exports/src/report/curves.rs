@@ -28,11 +28,11 @@ impl<'a> Line<'a> {
 pub struct Panel<'a> {
     /// Quantity that the lines show.
     pub what: &'a str,
-    /// Lines of the diagram, at most as many as there are colours (3).
+    /// Lines of the diagram. With more lines than colours (4), colours are used again.
     pub lines: Vec<Line<'a>>,
 }
 
-const COLOURS: [&str; 3] = ["#1f6fb4", "#c0392b", "#2e8b57"];
+const COLOURS: [&str; 4] = ["#1f6fb4", "#c0392b", "#2e8b57", "#8e44ad"];
 
 /// Draws diagrams one below the other. Names must be constants of the program.
 ///
@@ -94,7 +94,9 @@ fn panel(Panel { what, lines }: &Panel<'_>, best: Option<usize>, top: f64) -> St
             "<path d=\"M{x:.1} {y:.1}v{HEIGHT}\" stroke=\"#999\" stroke-dasharray=\"4 4\"/>"
         ));
     }
-    for (nth, (Line { name, values }, colour)) in lines.iter().zip(COLOURS).enumerate() {
+    for (nth, (Line { name, values }, colour)) in
+        lines.iter().zip(COLOURS.into_iter().cycle()).enumerate()
+    {
         let mut path = String::new();
         for (at, value) in values.iter().enumerate().filter(|sample| sample.1.is_finite()) {
             let to = if path.is_empty() { 'M' } else { 'L' };
@@ -138,6 +140,19 @@ mod tests {
             "{drawn}"
         );
         assert!(!drawn.contains("NaN"));
+    }
+
+    #[test]
+    fn every_line_is_drawn_even_if_there_are_more_than_colours() {
+        let lines = (0..5).map(|_| Line::new("a", [1.0, 2.0].into_iter())).collect();
+        let drawn = svg(
+            &[Panel {
+                what: "loss",
+                lines,
+            }],
+            None,
+        );
+        assert_eq!(drawn.matches("stroke-width").count(), 5);
     }
 
     #[test]
