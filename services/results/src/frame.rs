@@ -8,10 +8,7 @@ use messages::{
 
 use pipeline::Sighting;
 
-use crate::{Missing, Scene, own};
-
-/// A distance in a picture that is larger than any other, in pixels.
-const FAR_PX: f64 = 1e9;
+use crate::{Missing, Scene};
 
 /// The messages of one view about one frame; `None` for a message that was not received.
 #[derive(Debug, Clone, Default)]
@@ -136,40 +133,6 @@ impl FrameRecord {
             tracing::warn!(view, frame = self.frame(), %error, "the candidates of a view cannot be read");
             Vec::new()
         })
-    }
-
-    /// Returns the candidate of a view that is probably the followed person.
-    pub(crate) fn own(&self, scene: &Scene, view: usize) -> Option<Own> {
-        self.candidate(scene, view, self.followed())
-    }
-
-    /// Returns the candidate of a view that is probably a given person. With the filters, this is the best candidate. With a network, it is
-    /// the candidate closest to the projected person, unless it is closer to another person; or the largest candidate if the person is not
-    /// in the picture.
-    pub(crate) fn candidate(
-        &self,
-        scene: &Scene,
-        view: usize,
-        person: Option<&SkeletonMessage>,
-    ) -> Option<Own> {
-        let candidates = self.candidates(scene, view);
-        if !scene.has_maps {
-            return candidates.into_iter().next();
-        }
-        let distance_px =
-            |own: &Own, person: &SkeletonMessage| own::distance_px(scene, view, own, person);
-        let key = |own: &Own| {
-            let px = person.and_then(|person| distance_px(own, person));
-            let known = own.centres_px.iter().copied().filter(|at| at[0].is_finite());
-            px.unwrap_or_else(|| FAR_PX - geometry::longer_side(known).unwrap_or(0.0))
-        };
-        let keys = candidates.into_iter().map(|own| (key(&own), own));
-        let (own_px, own) = keys.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let id = person.map(|person| person.id);
-        let others = self.skeletons.listed().iter().filter(|other| Some(other.id) != id);
-        let is_of_another =
-            others.filter_map(|other| distance_px(&own, other)).any(|px| px < own_px);
-        (!is_of_another).then_some(own)
     }
 
     /// Returns the age in frames of the expected errors that fusion used for a view. It is the lowest age, because workers may differ.

@@ -5,7 +5,7 @@ use geometry::epipolar::epipolar_curve;
 use messages::{FusedView, MAX_PARTS, Status};
 use nalgebra::{Point2, Point3};
 
-use crate::{FrameRecord, Scene, pose3d};
+use crate::{FrameRecord, Scene, own, pose3d};
 
 /// Number of points on one epipolar line.
 const N_POINTS: usize = 64;
@@ -29,7 +29,7 @@ pub(crate) fn draw(
     draw_single(&mut canvas, scene, record, view);
     for fused in fused(record, view) {
         let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
-        if let Some(joints) = joints_of(scene, parts) {
+        if let Some(joints) = scene.joints_of(parts) {
             draw_limbs(&mut canvas, &joints, &limbs(scene));
         }
         if let Some(at) = parts.get(part) {
@@ -66,12 +66,12 @@ fn is_finite(fused: &FusedView) -> bool {
 }
 
 fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
-    let Some(best) = record.own(scene, view) else {
+    let Some(best) = own::followed(scene, record, view) else {
         return;
     };
     let width = thin(canvas);
     let centres = best.centres_px;
-    if let Some(joints) = joints_of(scene, &centres) {
+    if let Some(joints) = scene.joints_of(&centres) {
         for &(from, to) in scene.joints.limbs {
             let ends = [joints[from], joints[to]];
             if ends.as_flattened().iter().all(|side| side.is_finite()) {
@@ -120,12 +120,6 @@ fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: us
             canvas.polyline(&curve, thin(canvas), ACCENT);
         }
     }
-}
-
-/// Returns the joints of a pose; `None` if the parts of the model do not fit the joint set.
-pub(crate) fn joints_of(scene: &Scene, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
-    let n_parts = scene.joints.joints.iter().flat_map(|joint| joint.parts).max()? + 1;
-    (parts.len() >= n_parts).then(|| scene.joints.from_parts(parts))
 }
 
 fn limbs(scene: &Scene) -> Vec<Limb> {

@@ -5,10 +5,11 @@ use messages::{Joint3d, SkeletonMessage};
 use nalgebra::{Point3, Vector3};
 
 use crate::frame::Own;
-use crate::overlay::joints_of;
 use crate::pose3d::is_placed;
 use crate::{FrameRecord, Scene};
 
+/// A distance in a picture that is larger than any other, in pixels.
+const FAR_PX: f64 = 1e9;
 /// Minimum distance of a person from all others at which the views' candidates for this person can be told from those for others, in metres.
 const APART_M: f64 = 0.8;
 /// Median distance of a view's joints from the result up to which the view counts as showing the same person, in metres.
@@ -16,14 +17,41 @@ const SAME_PERSON_M: f64 = 0.25;
 /// Maximum distance of a joint that is counted, in metres. Larger distances count as this value.
 const MOST_M: f64 = 0.3;
 
+/// Returns the candidate of a view that is probably the followed person.
+pub(crate) fn followed(scene: &Scene, record: &FrameRecord, view: usize) -> Option<Own> {
+    candidate(scene, record, view, record.followed())
+}
+
+/// Returns the candidate of a view that is probably a given person. With the filters, this is the best candidate. With a network, it is the
+/// candidate closest to the projected person, unless it is closer to another person; or the largest candidate if the person is not in the
+/// picture.
+fn candidate(
+    scene: &Scene,
+    record: &FrameRecord,
+    view: usize,
+    person: Option<&SkeletonMessage>,
+) -> Option<Own> {
+    let candidates = record.candidates(scene, view);
+    if !scene.has_maps {
+        return candidates.into_iter().next();
+    }
+    let key = |own: &Own| {
+        let px = person.and_then(|person| distance_px(scene, view, own, person));
+        let known = own.centres_px.iter().copied().filter(|at| at[0].is_finite());
+        px.unwrap_or_else(|| FAR_PX - geometry::longer_side(known).unwrap_or(0.0))
+    };
+    let keys = candidates.into_iter().map(|own| (key(&own), own));
+    let (own_px, own) = keys.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let id = person.map(|person| person.id);
+    let others = record.skeletons.listed().iter().filter(|other| Some(other.id) != id);
+    let mut others_px = others.filter_map(|other| distance_px(scene, view, &own, other));
+    let is_of_another = others_px.any(|px| px < own_px);
+    (!is_of_another).then_some(own)
+}
+
 /// Returns the mean distance of a candidate's joints from the projected joints of a person, in pixels of the frame, with left and right as
 /// named or swapped. Returns `None` if they share no joint.
-pub(crate) fn distance_px(
-    scene: &Scene,
-    view: usize,
-    own: &Own,
-    person: &SkeletonMessage,
-) -> Option<f64> {
+fn distance_px(scene: &Scene, view: usize, own: &Own, person: &SkeletonMessage) -> Option<f64> {
     let mirror = scene.model.spec().mirror.as_deref();
     let swapped: Option<Vec<_>> =
         mirror.map(|mirror| mirror.iter().map(|part| own.centres_px[*part]).collect());
@@ -74,7 +102,7 @@ pub(crate) fn readings(
     view: usize,
     person: Option<&SkeletonMessage>,
 ) -> Option<[Vec<[f64; 2]>; 2]> {
-    let best = record.candidate(scene, view, person).filter(|own| own.is_clear)?;
+    let best = candidate(scene, record, view, person).filter(|own| own.is_clear)?;
     let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
     let exchanged = mirror.map(|mirror| mirror.iter().map(|part| named[*part]).collect());
@@ -123,7 +151,7 @@ fn distances(
     parts: &[[f64; 2]],
 ) -> Vec<[f64; 2]> {
     let camera = scene.views[view].framing.camera();
-    let seen = joints_of(scene, parts).unwrap_or_default();
+    let seen = scene.joints_of(parts).unwrap_or_default();
     let both = person.listed_joints().iter().zip(&seen);
     both.filter_map(|(joint, seen)| distance(camera, joint, *seen)).collect()
 }
@@ -215,14 +243,14 @@ mod tests {
         let both = set([-0.5, 0.5], &[0.7, -0.3]);
         let people = &both.skeletons.people[..2];
         for (person, x) in people.iter().zip([-0.3, 0.7]) {
-            let own = both.candidate(&scene, 0, Some(person)).unwrap();
+            let own = candidate(&scene, &both, 0, Some(person)).unwrap();
             let at = camera.project(&[x, 0.0, 0.0].into()).unwrap();
             assert!((own.centres_px[0][0] - at.x).abs() < 1e-3);
         }
         assert_eq!(apart(&both).unwrap().id, 2);
         // The second person is not seen.
         let one = set([-0.5, 0.5], &[-0.3]);
-        assert!(one.candidate(&scene, 0, Some(&one.skeletons.people[1])).is_none());
+        assert!(candidate(&scene, &one, 0, Some(&one.skeletons.people[1])).is_none());
         assert!(apart(&set([-0.2, 0.2], &[0.7, -0.3])).is_none());
     }
 

@@ -4,7 +4,7 @@ use messages::{FusedView, MAX_PARTS, Status};
 use runfiles::{Facing, FusedPose, Part, SinglePose, TypedPart, ViewLine};
 
 use crate::scene::View;
-use crate::{FrameRecord, Scene};
+use crate::{FrameRecord, Scene, own};
 
 /// Returns the lines of one frame, one per view.
 ///
@@ -61,7 +61,7 @@ fn fused_pose(view: &View, fused: &FusedView) -> FusedPose {
 
 fn single(scene: &Scene, record: &FrameRecord, view: usize) -> Option<SinglePose> {
     let candidates = record.candidates(scene, view);
-    let best = record.own(scene, view)?;
+    let best = own::followed(scene, record, view)?;
     let it = &scene.views[view];
     let pose = best.pose.as_ref();
     let part = |(part, centre): (usize, &[f64; 2])| {

@@ -50,6 +50,12 @@ impl Scene {
         self.frame_rate_hz.map(|rate| frame as f64 / rate)
     }
 
+    /// Returns the joints of a pose; `None` if the parts of the model do not fit the joint set.
+    pub(crate) fn joints_of(&self, parts: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        let n_parts = self.joints.joints.iter().flat_map(|joint| joint.parts).max()? + 1;
+        (parts.len() >= n_parts).then(|| self.joints.from_parts(parts))
+    }
+
     /// Returns the names of the views whose bits are set.
     pub fn names(&self, mask: u32) -> Vec<&str> {
         self.views
