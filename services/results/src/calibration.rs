@@ -252,6 +252,12 @@ mod tests {
             colour: None,
             age_s: 0.0,
         };
+        let old = pipeline::Sighting {
+            age_s: 0.1,
+            ..seen.clone()
+        };
+        record.views[0].pose = wire::sightings_to_message(&[old], 0, [80, 60]).ok();
+        assert_eq!(parts(&maps, &record, 0, record.followed()), None);
         record.views[0].pose = wire::sightings_to_message(&[seen], 0, [80, 60]).ok();
         assert_eq!(
             parts(&maps, &record, 0, record.followed()).unwrap().len(),

@@ -158,6 +158,8 @@ pub(crate) struct Own {
     pub(crate) score: f32,
     /// True if the view is sure that this is a person.
     pub(crate) is_clear: bool,
+    /// True if the person was looked for in this frame; false for a sighting of an earlier frame that was reused to save time.
+    pub(crate) is_fresh: bool,
     /// The pose found by the paper's method.
     pub(crate) pose: Option<Pose>,
 }
@@ -168,6 +170,7 @@ impl Own {
             centres_px: pipeline::parts_of(&person.places(false)),
             score: person.score,
             is_clear: person.is_clear(least_heat),
+            is_fresh: person.age_s <= 0.0,
             pose: None,
         }
     }
@@ -177,6 +180,7 @@ impl Own {
             centres_px: pose.centres(&scene.model, &scene.views[view].layout),
             score: pose.score,
             is_clear: true,
+            is_fresh: true,
             pose: Some(pose),
         }
     }

@@ -94,15 +94,16 @@ fn centre(person: &SkeletonMessage) -> Option<Point3<f64>> {
     (n > 0.0).then(|| Point3::from(sum / n))
 }
 
-/// Returns the parts of a view's candidate for a person in pixels of the frame, once with left and right as named by the network or filters, and
-/// once with left and right swapped. Returns `None` if the view has no candidate, or if its candidate is too uncertain.
+/// Returns the parts of a view's candidate for a person in pixels of the frame, once with left and right as named by the network or filters,
+/// and once with left and right swapped. Returns `None` if the view has no candidate, or if its candidate is too uncertain or of an earlier
+/// frame.
 pub(crate) fn readings(
     scene: &Scene,
     record: &FrameRecord,
     view: usize,
     person: Option<&SkeletonMessage>,
 ) -> Option<[Vec<[f64; 2]>; 2]> {
-    let best = candidate(scene, record, view, person).filter(|own| own.is_clear)?;
+    let best = candidate(scene, record, view, person).filter(|own| own.is_clear && own.is_fresh)?;
     let named = best.centres_px;
     let mirror = scene.model.spec().mirror.as_deref();
     let exchanged = mirror.map(|mirror| mirror.iter().map(|part| named[*part]).collect());
