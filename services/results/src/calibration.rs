@@ -216,9 +216,15 @@ fn parts(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+    use std::sync::Arc;
+
+    use geometry::{Framing, OutSize};
+    use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
     use super::*;
-    use crate::testing::{record, scene};
+    use crate::View;
+    use crate::testing::{record, scene, sighting, skeletons};
 
     #[test]
     fn every_camera_has_an_entry_and_with_two_cameras_none_is_suspected() {
@@ -243,15 +249,7 @@ mod tests {
             has_maps: true,
             ..scene
         };
-        let seen = pipeline::Sighting {
-            joints: [Some([9.0, 7.0]); 14],
-            heats: [0.9; 14],
-            score: 0.5,
-            front: [0.0; 2],
-            extras: Vec::new(),
-            colour: None,
-            age_s: 0.0,
-        };
+        let seen = sighting([[9.0, 7.0]; 14]);
         let old = pipeline::Sighting {
             age_s: 0.1,
             ..seen.clone()
@@ -268,6 +266,88 @@ mod tests {
             ..maps
         };
         assert_eq!(parts(&strict, &record, 0, record.followed()), None);
+    }
+
+    /// Returns a scene of four cameras on a ring of radius 4 m that look at the origin.
+    fn ring() -> Scene {
+        let scene = scene();
+        let view = |nth: u8| {
+            let angle = f64::from(nth) * std::f64::consts::FRAC_PI_2;
+            let eye = Point3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.0);
+            let look = Isometry3::look_at_rh(&eye, &Point3::origin(), &Vector3::z());
+            let mut camera = scene.views[0].framing.camera().clone();
+            camera.intrinsics.size = [160, 120];
+            // The camera's y points down.
+            camera.camera_from_world = Isometry3::rotation(Vector3::x() * PI) * look;
+            let size = [160, 120];
+            let framing = Framing::new(&camera, size, None, OutSize::Exact(size), 0.0).unwrap();
+            View {
+                name: format!("c{nth}"),
+                framing,
+                layout: Arc::clone(&scene.views[0].layout),
+            }
+        };
+        Scene {
+            views: (0..4).map(view).collect(),
+            has_maps: true,
+            ..scene
+        }
+    }
+
+    /// Returns the cameras that are named after 30 frames of two people.
+    ///
+    /// * `apart_m`: distance of the people.
+    /// * `moved_m`: distance by which camera c2 was moved since its calibration.
+    fn named(apart_m: f64, moved_m: f64) -> Vec<String> {
+        let scene = ring();
+        let mut calibration = Calibration::new(&scene);
+        let joints = |x: f64| -> [Point3<f64>; 14] {
+            core::array::from_fn(|nth| {
+                let turn = nth as f64;
+                Point3::new(x + 0.2 * turn.cos(), 0.2 * turn.sin(), 0.1 * turn - 0.7)
+            })
+        };
+        let people = [-0.5, 0.5].map(|side| joints(side * apart_m));
+        let mut record = record(0);
+        (record.skeletons.n_people, record.skeletons.n_seen) = (2, 2);
+        for ((message, id), joints) in record.skeletons.people.iter_mut().zip(1..).zip(&people) {
+            (*message, message.id) = (skeletons(0).people[0], id);
+            for (place, joint) in message.joints.iter_mut().zip(joints) {
+                place.in_world = joint.coords.into();
+            }
+        }
+        record.views.resize(4, record.views[0].clone());
+        for (nth, view) in record.views.iter_mut().enumerate() {
+            let mut camera = scene.views[nth].framing.camera().clone();
+            if nth == 2 {
+                let by = Translation3::new(moved_m, 0.0, 0.0);
+                camera.camera_from_world = by * camera.camera_from_world;
+            }
+            let seen = people.map(|joints| {
+                sighting(joints.map(|joint| {
+                    let at = camera.project(&joint).unwrap();
+                    [at.x as f32, at.y as f32]
+                }))
+            });
+            view.pose = wire::sightings_to_message(&seen, 0, [160, 120]).ok();
+        }
+        for _ in 0..30 {
+            calibration.add(&scene, &record);
+        }
+        let fits = calibration.fits(scene.views.iter().map(|view| view.name.clone()));
+        let named = fits.into_iter().filter(|(_, fit)| fit.suspected);
+        named.map(|(name, _)| name).collect()
+    }
+
+    #[test]
+    fn a_moved_camera_is_named_while_several_people_who_are_apart_are_in_view() {
+        assert_eq!(named(2.0, 0.3), ["c2"]);
+        assert_eq!(named(2.0, 0.0), [""; 0]);
+        assert_eq!(
+            named(0.5, 0.3),
+            [""; 0],
+            "their candidates are not told apart"
+        );
     }
 
     #[test]

@@ -67,7 +67,8 @@ fn distance_px(scene: &Scene, view: usize, own: &Own, person: &SkeletonMessage) 
     named.zip(swapped).map(|(a, b)| a.min(b)).or(named)
 }
 
-/// Returns the person who is farthest from all others; `None` if that person is less than [`APART_M`] from another one.
+/// Returns the person who is farthest from all others; `None` if that person is less than [`APART_M`] from another one, or if somebody who
+/// was seen has no joints, and may thus be anywhere.
 pub(crate) fn apart(record: &FrameRecord) -> Option<&SkeletonMessage> {
     let people: Vec<_> = record
         .skeletons
@@ -75,6 +76,9 @@ pub(crate) fn apart(record: &FrameRecord) -> Option<&SkeletonMessage> {
         .iter()
         .filter_map(|person| Some((person, centre(person)?)))
         .collect();
+    if people.len() < record.skeletons.n_seen as usize {
+        return None;
+    }
     let nearest_m = |nth: usize| {
         let others = people.iter().enumerate().filter(|other| other.0 != nth);
         let metres = others.map(|(_, other)| (other.1 - people[nth].1).norm());
@@ -219,15 +223,7 @@ mod tests {
         let camera = scene.views[0].framing.camera().clone();
         let seen = |x: f64| {
             let at = camera.project(&[x, 0.0, 0.0].into()).unwrap();
-            pipeline::Sighting {
-                joints: [Some([at.x as f32, at.y as f32]); 14],
-                heats: [0.9; 14],
-                score: 0.5,
-                front: [0.0; 2],
-                extras: Vec::new(),
-                colour: None,
-                age_s: 0.0,
-            }
+            crate::testing::sighting([[at.x as f32, at.y as f32]; 14])
         };
         let mut set = |xs: [f64; 2], seen_at: &[f64]| {
             record.skeletons.n_people = 2;

@@ -9,6 +9,7 @@ use messages::{
     Skeletons, Status,
 };
 use nalgebra::{Isometry3, Vector3};
+use pipeline::Sighting;
 
 use crate::{FrameRecord, Scene, View, ViewRecord};
 
@@ -111,6 +112,21 @@ pub(crate) fn skeletons(frame: u64) -> Box<Skeletons> {
     skeletons.views_present = 0b11;
     (skeletons.n_people, skeletons.people[0]) = (1, person);
     skeletons
+}
+
+/// Returns a person whom a network has just seen clearly.
+///
+/// * `joints`: the joints of `skeleton::PARSE14`, in pixels of the frame.
+pub(crate) fn sighting(joints: [[f32; 2]; 14]) -> Sighting {
+    Sighting {
+        joints: joints.map(Some),
+        heats: [0.9; 14],
+        score: 0.5,
+        front: [0.0; 2],
+        extras: Vec::new(),
+        colour: None,
+        age_s: 0.0,
+    }
 }
 
 /// Returns a frame in which both views found a person.

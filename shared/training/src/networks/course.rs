@@ -1,5 +1,5 @@
-//! Parts that the trainings of the networks that find people and joints have in common: steps of Adam, regular evaluations, ONNX files with
-//! weights in half precision.
+//! Parts that the trainings of the networks that find people and joints have in common: averages of steps, regular evaluations, ONNX files
+//! with weights in half precision.
 
 use core::fmt::Debug;
 
@@ -7,7 +7,6 @@ use formats::checksum::fnv1a;
 
 use crate::networks::lesson::Shown;
 use crate::networks::onnx::Document;
-use crate::networks::optimiser::{Rule, Step};
 use crate::networks::parameters::Parameter;
 use crate::networks::training::Plan;
 
@@ -72,18 +71,11 @@ pub(crate) fn plan(left: usize, passes: usize) -> Plan {
     }
 }
 
-/// Returns a step of Adam of length `rate`.
+/// Returns the weight of the parameters after a step in their average.
 ///
-/// * `decay`, `longest`, `averaged`: as in the settings.
-pub(crate) fn step(nth: usize, rate: f32, [decay, longest, averaged]: [f32; 3]) -> Step {
-    Step {
-        rule: Rule::Adam,
-        rate,
-        decay,
-        longest,
-        // At the beginning of the training, there are only a few steps to average.
-        averaged: averaged.max(1.0 / (nth as f32 + 2.0)),
-    }
+/// * `averaged`: as in the settings. At the beginning of the training, there are only a few steps to average.
+pub(crate) fn averaged(nth: usize, averaged: f32) -> f32 {
+    averaged.max(1.0 / (nth as f32 + 2.0))
 }
 
 /// Returns the mean of a part of the costs of several steps.

@@ -13,7 +13,7 @@ use super::vary::{NetworkSample, plain, varied};
 use crate::networks::course::{self, JUDGED_AT_ONCE, TooFew};
 use crate::networks::lesson::Shown;
 use crate::networks::onnx;
-use crate::networks::optimiser::{Schedule, Step};
+use crate::networks::optimiser::{Rule, Schedule, Step};
 use crate::networks::order;
 use crate::networks::parameters::Parameter;
 use crate::networks::settings::Precision;
@@ -220,8 +220,13 @@ impl Task for PoseTask<'_> {
 
     fn step(&self, nth: usize) -> Step {
         let settings = self.settings;
-        let limits = [settings.decay, settings.longest, settings.averaged];
-        course::step(nth, self.rate(nth), limits)
+        Step {
+            rule: Rule::Adam,
+            rate: self.rate(nth),
+            decay: settings.decay,
+            longest: settings.longest,
+            averaged: course::averaged(nth, settings.averaged),
+        }
     }
 
     fn batch(&self, nth: usize) -> Batch<Shape, Truth> {
