@@ -39,13 +39,14 @@ pub(super) fn direction(
     v: [f64; 3],
 ) -> Result<nalgebra::UnitVector3<f64>, ParseError> {
     let v = Vector3::from(v);
-    let unit = nalgebra::UnitVector3::try_new(v, 1e-9);
-    unit.filter(|unit| unit.iter().all(|c| c.is_finite()))
-        .ok_or_else(|| ParseError::Value {
-            field: field.to_owned(),
-            value: v.norm(),
-            requirement: "the length of a direction must be positive and finite",
-        })
+    // The length of finite numbers may be infinite; divided by it, they are all zero.
+    let length = v.norm();
+    let unit = nalgebra::UnitVector3::try_new(v, 1e-9).filter(|_| length.is_finite());
+    unit.ok_or_else(|| ParseError::Value {
+        field: field.to_owned(),
+        value: length,
+        requirement: "the length of a direction must be positive and finite",
+    })
 }
 
 /// Validates the calibration matrix K and splits it into intrinsics.

@@ -70,6 +70,7 @@ fn errors_of_the_parallax_format_name_the_field() {
         &["two cameras are named \"cam1\""],
     );
     refused(with("up", "up = [0, 0, 0]"), &["up is 0"]);
+    refused(with("up", "up = [0, 0, 1e200]"), &["up is inf"]);
     refused(with("format", "format = \"other\""), &["format", "other"]);
     refused(
         own::parse("format = \"parallax-rig\"", &ReadOptions::default()),
