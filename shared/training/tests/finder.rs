@@ -3,8 +3,8 @@
 
 use proptest::prelude::*;
 use training::networks::finder::{
-    Around, BOXES, CHANNELS, FinderTask, PICTURE, Picture, STRIDE, Settings, Shape, Vary, card,
-    plain, varied,
+    Around, BOXES, CHANNELS, FinderSample, FinderTask, PICTURE, Picture, STRIDE, Settings, Shape,
+    Vary, card, plain, varied,
 };
 use training::networks::{About, Backend, Plan, Task as _, Trainer};
 
@@ -173,16 +173,25 @@ proptest! {
         let sample = varied(&pictures[0], &pictures, (&settings.shape, &settings.vary), &mut rng);
         prop_assert!(sample.picture.iter().all(|value| value.is_finite()));
         let n = settings.shape.cells().pow(2);
-        // A box that is narrower than a cell may have no sides in the cell of its middle.
-        let is_boxed = |(heat, left): (&f32, &f32)| *heat == 1.0 && *left > 0.0;
-        let log_odds = sample.heat.iter().zip(&sample.sides).map(is_boxed);
-        let log_odds = log_odds.map(|is_boxed| if is_boxed { 5.0 } else { -5.0 });
-        let logarithms = sample.sides.iter().map(|side| side.max(1e-3).ln());
-        let values: Vec<f32> = log_odds.chain(logarithms).collect();
         let mut card = keypoints::DetectorCard::parse(&card(&settings.shape, &About::default())).unwrap();
         card.most_overlap = 1.0;
         let cells = settings.shape.cells();
-        let found = card.boxes(&values, &[1, 5, cells, cells]).unwrap();
+        let decoded = |sample: &FinderSample| {
+            // A box that is narrower than a cell may have no sides in the cell of its middle.
+            let is_boxed = |(heat, left): (&f32, &f32)| *heat == 1.0 && *left > 0.0;
+            let is_boxed = sample.heat.iter().zip(&sample.sides).map(is_boxed);
+            let log_odds = is_boxed.map(|is_boxed| if is_boxed { 5.0 } else { -5.0 });
+            let logarithms = sample.sides.iter().map(|side| side.max(1e-3).ln());
+            let values: Vec<f32> = log_odds.chain(logarithms).collect();
+            card.boxes(&values, &[1, 5, cells, cells]).unwrap()
+        };
+        // The whole picture has one person, and the size of the sample.
+        let whole = decoded(&plain(&pictures[0], &settings.shape));
+        prop_assert_eq!(whole.len(), 1);
+        for (got, expected) in whole[0].outline.iter().zip(pictures[0].people[0].outline) {
+            prop_assert!((got - f64::from(expected)).abs() < 1e-3, "{whole:?}");
+        }
+        let found = decoded(&sample);
         for found in &found {
             let [left, top, right, bottom] = found.outline;
             let [width, height] = [right - left, bottom - top];
