@@ -67,8 +67,8 @@ fn distance_px(scene: &Scene, view: usize, own: &Own, person: &SkeletonMessage) 
     named.zip(swapped).map(|(a, b)| a.min(b)).or(named)
 }
 
-/// Returns the person who is farthest from all others; `None` if that person is less than [`APART_M`] from another one, or if somebody who
-/// was seen has no joints, and may thus be anywhere.
+/// Returns the person who is farthest from all others; `None` if that person is less than [`APART_M`] from another one, or if another person
+/// in view has no joints, and so no known position.
 pub(crate) fn apart(record: &FrameRecord) -> Option<&SkeletonMessage> {
     let people: Vec<_> = record
         .skeletons
