@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, UnitVector3};
 
 use super::{ParseError, ReadOptions};
 use crate::rig::LeftOut;
-use crate::{Camera, Intrinsics, Rig};
+use crate::{Camera, Intrinsics, Rig, RigError};
 
 /// Reason why a camera is left out although its lens is known.
 const NO_PLACE: &str = "its file has a lens but no pose";
@@ -72,5 +72,13 @@ pub(super) fn rig(
         });
     }
     let rig = Rig::new(cameras, up, source).map_err(ParseError::Rig)?;
+    for left_out in &left_out {
+        let named_alike = rig.cameras().iter().filter(|camera| camera.name == left_out.camera);
+        let is_in_the_rig = options.lenses_suffice && left_out.why == NO_PLACE;
+        if named_alike.count() > usize::from(is_in_the_rig) {
+            let name = left_out.camera.clone();
+            return Err(ParseError::Rig(RigError::DuplicateName { name }));
+        }
+    }
     Ok(rig.with_left_out(left_out))
 }

@@ -117,6 +117,29 @@ distortions = [0.0, 0.0, 0.0, 0.0]\n{place}\n"
 }
 
 #[test]
+fn a_camera_without_a_pose_has_a_name_of_its_own() {
+    let camera = |key: &str, rest: &str| {
+        format!(
+            "[{key}]\nname = \"a\"\nsize = [1280, 720]\nmatrix = [[900.0, 0.0, 640.0], [0.0, 900.0, 360.0], [0.0, 0.0, 1.0]]\n\
+             distortions = [0.0, 0.0, 0.0, 0.0]\n{rest}\n"
+        )
+    };
+    let placed = camera(
+        "first",
+        "rotation = [0.0, 0.0, 0.0]\ntranslation = [0.0, 0.0, 1.0]",
+    );
+    let alone = pose2sim::parse(&camera("second", ""), &LENSES).unwrap();
+    assert_eq!((alone.cameras().len(), alone.left_out().len()), (1, 1));
+    for options in [LENSES, ReadOptions::default()] {
+        let refused = pose2sim::parse(&(placed.clone() + &camera("second", "")), &options);
+        let Err(ParseError::Rig(crate::RigError::DuplicateName { name })) = refused else {
+            panic!("{refused:?}");
+        };
+        assert_eq!(name, "a");
+    }
+}
+
+#[test]
 fn units_are_given_by_name_or_as_a_length() {
     let metres = |text: &str| text.parse().map(|unit: Unit| 1.0 / unit.per_metre());
     for (text, expected) in [
