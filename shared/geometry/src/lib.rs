@@ -56,5 +56,5 @@ pub use survey::{Place, Shared, Survey, survey};
 pub use triangulate::{
     MAX_VIEWS, Observation, Settings, TriangulateError, Triangulated, triangulate,
 };
-pub use up::{y_up_from_world, z_up_from_world};
+pub use up::{direction, y_up_from_world, z_up_from_world};
 pub use wide::{Sightline, widest_apart};

@@ -1,6 +1,13 @@
-//! Rotations of the world so that a given axis points up, for files whose readers expect this.
+//! Directions that users give, and rotations of the world so that a given axis points up, for files whose readers expect this.
 
 use nalgebra::{Matrix3, Rotation3, UnitVector3, Vector3};
+
+/// Returns the direction of three numbers from outside; `None` if they have no length, or if it is not finite.
+pub fn direction(numbers: [f64; 3]) -> Option<UnitVector3<f64>> {
+    let vector = Vector3::from(numbers);
+    // Finite numbers may have an infinite length; divided by it, they are all zero.
+    UnitVector3::try_new(vector, 1e-9).filter(|_| vector.norm().is_finite())
+}
 
 /// Returns the smallest rotation of the world with which z points up; the identity if it already does.
 ///
@@ -22,6 +29,19 @@ pub fn y_up_from_world(up: &UnitVector3<f64>) -> Rotation3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_without_a_finite_length_are_no_direction() {
+        assert_eq!(direction([0.0, -2.0, 0.0]), Some(-Vector3::y_axis()));
+        for numbers in [
+            [0.0; 3],
+            [f64::NAN, 0.0, 1.0],
+            [0.0, f64::INFINITY, 0.0],
+            [0.0, 0.0, 1e200],
+        ] {
+            assert_eq!(direction(numbers), None, "{numbers:?}");
+        }
+    }
 
     #[test]
     fn any_up_direction_is_rotated_to_the_requested_axis() {

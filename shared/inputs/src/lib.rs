@@ -31,7 +31,6 @@ use geometry::Rig;
 use geometry::files::{ReadOptions, RigFileError};
 use multiview::learned::{Appearance, Learned, Shape};
 use multiview::{Compatibility, TypeTables};
-use nalgebra::UnitVector3;
 use pipeline::PairTables;
 use viewquality::orientation::Detector;
 use viewquality::{Network, NetworkError, Table, Tau};
@@ -132,7 +131,7 @@ fn rig_with(deployment: &Deployment, options: ReadOptions) -> Result<Rig, Failur
         ..options
     };
     let read = rig(&[&deployment.rig], &options)?;
-    let up = deployment.up.and_then(|up| UnitVector3::try_new(up.into(), 1e-9));
+    let up = deployment.up.and_then(geometry::direction);
     Ok(match up {
         Some(up) => read.with_up(Some(up)),
         None => read,

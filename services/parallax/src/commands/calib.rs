@@ -9,7 +9,6 @@ use clap::{Args, Subcommand, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _};
 use geometry::files::{Format, ReadOptions, Unit};
 use geometry::{Camera, LeftOut, Rig, Shared, Survey, upright_roll};
-use nalgebra::{UnitVector3, Vector3};
 use serde_json::{Value, json};
 use terminal::output;
 
@@ -112,7 +111,7 @@ impl Input {
     fn read(&self, lenses_suffice: bool) -> Result<Rig, Failure> {
         let up = match self.up.as_deref() {
             Some(&[x, y, z]) => {
-                let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
+                let up = geometry::direction([x, y, z]);
                 let message = format!("--up {x} {y} {z} is not a direction");
                 Some(up.ok_or(message).or_fail(ExitKind::Usage)?)
             }

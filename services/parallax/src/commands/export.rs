@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use failure::{ExitKind, Failure, OrFail as _, Stop};
 use launch::export::{Format, Given, Job, Lines, Origin, Trial, Written, as_json, export};
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::UnitVector3;
 use terminal::{Globals, Terminal, output};
 
 /// Note for a build without the format.
@@ -134,10 +134,9 @@ fn rate(text: &str) -> Result<f64, String> {
 
 pub(crate) fn up(text: &str) -> Result<UnitVector3<f64>, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    let [x, y, z] = numbers.and_then(|number| number.try_into().ok()).unwrap_or_default();
-    let up = UnitVector3::try_new(Vector3::new(x, y, z), 1e-9);
-    up.filter(|up| up.iter().all(|value| value.is_finite()))
-        .ok_or_else(|| format!("expected a direction such as 0,0,1, got {text:?}"))
+    let numbers: Option<[f64; 3]> = numbers.and_then(|number| number.try_into().ok());
+    let direction = numbers.and_then(geometry::direction);
+    direction.ok_or_else(|| "expected three numbers, not all 0, such as 0,0,1".to_owned())
 }
 
 /// Runs the command.
@@ -238,6 +237,8 @@ fn report(origin: &Origin, written: &[Written]) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     fn names(text: &str) -> Result<Vec<&'static str>, String> {
@@ -260,7 +261,16 @@ mod tests {
     fn invalid_directions_and_names_are_refused() {
         assert_eq!(up("0,0,2").unwrap(), Vector3::z_axis());
         assert_eq!(up("0, -1, 0").unwrap(), -Vector3::y_axis());
-        for text in ["", "1,2", "0,0,0", "a,b,c", "1,2,3,4", "nan,0,0", "inf,0,0"] {
+        for text in [
+            "",
+            "1,2",
+            "0,0,0",
+            "a,b,c",
+            "1,2,3,4",
+            "nan,0,0",
+            "inf,0,0",
+            "1e200,0,0",
+        ] {
             assert!(up(text).is_err(), "{text}");
         }
         for text in ["", "a/b", "..", ".x", "a\n"] {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use failure::{ExitKind, Failure};
 use motion::finished::{self, Method, Outcome, Request, Settings};
-use nalgebra::{UnitVector3, Vector3};
+use nalgebra::UnitVector3;
 use serde_json::{Value, json};
 use terminal::{Globals, Terminal, output};
 
@@ -58,7 +58,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "HZ", value_parser = rate)]
     rate_hz: Option<f64>,
     /// Upward direction in the world of the run, in place of the direction in its calibration.
-    #[arg(long, value_name = "X,Y,Z", value_parser = up, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = super::export::up, allow_hyphen_values = true)]
     up: Option<UnitVector3<f64>>,
     /// Print JSON.
     #[arg(long)]
@@ -90,13 +90,6 @@ fn rate(text: &str) -> Result<f64, String> {
 fn within(text: &str, [least, most]: [f64; 2]) -> Result<f64, String> {
     let number = text.parse().ok().filter(|value| (least..=most).contains(value));
     number.ok_or_else(|| format!("expected {least} to {most}"))
-}
-
-fn up(text: &str) -> Result<UnitVector3<f64>, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    let direction = numbers.filter(|number| number.len() == 3).map(Vector3::from_vec);
-    let direction = direction.and_then(|direction| UnitVector3::try_new(direction, 1e-9));
-    direction.ok_or_else(|| "expected three numbers, not all 0, such as 0,0,1".to_owned())
 }
 
 /// Runs the command.

@@ -38,13 +38,9 @@ pub(super) fn direction(
     field: &str,
     v: [f64; 3],
 ) -> Result<nalgebra::UnitVector3<f64>, ParseError> {
-    let v = Vector3::from(v);
-    // The length of finite numbers may be infinite; divided by it, they are all zero.
-    let length = v.norm();
-    let unit = nalgebra::UnitVector3::try_new(v, 1e-9).filter(|_| length.is_finite());
-    unit.ok_or_else(|| ParseError::Value {
+    crate::direction(v).ok_or_else(|| ParseError::Value {
         field: field.to_owned(),
-        value: length,
+        value: Vector3::from(v).norm(),
         requirement: "the length of a direction must be positive and finite",
     })
 }

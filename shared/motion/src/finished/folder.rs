@@ -232,7 +232,7 @@ fn deployment_of(folder: &Path) -> Option<Value> {
 pub(crate) fn up(folder: &Path) -> Option<UnitVector3<f64>> {
     let deployment = deployment_of(folder)?;
     if let Ok(up) = serde_json::from_value::<[f64; 3]>(deployment.get("up")?.clone()) {
-        return UnitVector3::try_new(up.into(), 1e-9);
+        return geometry::direction(up);
     }
     let rig = deployment.get("rig")?.as_str()?;
     let rig = geometry::files::read(Path::new(rig), &ReadOptions::default()).ok()?;
