@@ -26,7 +26,7 @@ pub(crate) fn settle(
         .collect();
     let mut is_changed = vec![false; tracks.len()];
     let mut counts = [0; 3];
-    let is_some_sure = recorded.sides.contains(&Sides::Sure);
+    let is_some_sure = recorded.is_some_sure();
     for at in 0..recorded.times.len() {
         if is_some_sure && recorded.sides[at] == Sides::Unsure {
             counts[unsure(recorded, &pairs, tracks, at, &mut is_changed)] += 1;

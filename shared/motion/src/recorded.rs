@@ -116,11 +116,18 @@ impl Recorded {
         Ok(())
     }
 
+    /// Returns true if left and right are certain at an instant with a measurement. Nothing is uncertain where nobody is seen.
+    pub(crate) fn is_some_sure(&self) -> bool {
+        let is_measured = |at: usize| self.joints.iter().any(|joint| joint.measured[at].is_some());
+        let mut sides = self.sides.iter().enumerate();
+        sides.any(|(at, side)| *side == Sides::Sure && is_measured(at))
+    }
+
     /// Returns a function of a joint and an instant that returns true if the measurement is left out because its side is uncertain. If left
-    /// and right are uncertain at all instants, nothing is left out, because otherwise nothing would remain.
+    /// and right are uncertain at all instants with a measurement, nothing is left out, because otherwise nothing would remain.
     pub(crate) fn withheld(&self) -> impl Fn(usize, usize) -> bool {
         let others = self.other_sides();
-        let is_some_sure = self.sides.contains(&Sides::Sure);
+        let is_some_sure = self.is_some_sure();
         move |joint, at| is_some_sure && others[joint].is_some() && self.sides[at] == Sides::Unsure
     }
 
@@ -128,7 +135,7 @@ impl Recorded {
     /// left out.
     pub(crate) fn unsure(&self) -> [usize; 3] {
         let n = self.sides.iter().filter(|side| **side == Sides::Unsure).count();
-        if self.sides.contains(&Sides::Sure) {
+        if self.is_some_sure() {
             [0, 0, n]
         } else {
             [n, 0, 0]

@@ -167,6 +167,13 @@ fn without_certain_sides_no_measurement_is_rejected() {
     recorded.sides.fill(Sides::Unsure);
     let got = crate::smooth(&recorded, &Settings::default());
     assert_eq!(got.report.counts[0].absent, 0);
+    // Sides are certain where nobody is seen, but that must not cost the others their limbs.
+    recorded.sides[..3].fill(Sides::Sure);
+    for joint in &mut recorded.joints {
+        joint.measured[..3].fill(None);
+    }
+    let got = crate::smooth(&recorded, &Settings::default());
+    assert!(got.joints[0][3..].iter().all(Result::is_ok));
 }
 
 #[test]
