@@ -116,7 +116,7 @@ impl Recorded {
         Ok(())
     }
 
-    /// Returns true if left and right are certain at an instant with a measurement. Nothing is uncertain where nobody is seen.
+    /// Returns true if left and right are certain at an instant with a measurement. An instant without one is [`Sides::Sure`] too.
     pub(crate) fn is_some_sure(&self) -> bool {
         let is_measured = |at: usize| self.joints.iter().any(|joint| joint.measured[at].is_some());
         let mut sides = self.sides.iter().enumerate();

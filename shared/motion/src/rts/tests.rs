@@ -167,7 +167,7 @@ fn without_certain_sides_no_measurement_is_rejected() {
     recorded.sides.fill(Sides::Unsure);
     let got = crate::smooth(&recorded, &Settings::default());
     assert_eq!(got.report.counts[0].absent, 0);
-    // Sides are certain where nobody is seen, but that must not cost the others their limbs.
+    // Instants at which nobody is seen do not make the other instants lose their limbs.
     recorded.sides[..3].fill(Sides::Sure);
     for joint in &mut recorded.joints {
         joint.measured[..3].fill(None);
