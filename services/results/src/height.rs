@@ -76,7 +76,8 @@ impl Heights {
 /// Returns the longer side of the rectangle around the centres of the parts, in pixels of the frame.
 pub(crate) fn height_px(fused: &FusedView) -> Option<f64> {
     let parts = &fused.centres_px[..(fused.n_parts as usize).min(MAX_PARTS)];
-    geometry::longer_side(parts.iter().copied()).filter(|px| px.is_finite())
+    let known = parts.iter().copied().filter(|part| part.iter().all(|side| side.is_finite()));
+    geometry::longer_side(known)
 }
 
 /// Returns the lower median.

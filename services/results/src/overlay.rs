@@ -32,9 +32,9 @@ pub(crate) fn draw(
         if let Some(joints) = scene.joints_of(parts) {
             draw_limbs(&mut canvas, &joints, &limbs(scene));
         }
-        if let Some(at) = parts.get(part) {
+        if let Some(at) = centre(fused, part) {
             let width = line_width(size);
-            canvas.ring(*at, 10.0 / 3.0 * width, width, ACCENT);
+            canvas.ring(at, 10.0 / 3.0 * width, width, ACCENT);
         }
     }
     draw_keypoints(&mut canvas, scene, record, view);
@@ -57,12 +57,14 @@ fn thin(canvas: &Canvas) -> f64 {
 fn fused(record: &FrameRecord, view: usize) -> impl Iterator<Item = &FusedView> {
     let people = record.skeletons.listed().iter();
     let poses = people.filter_map(move |person| person.listed_views().get(view));
-    poses.filter(|fused| fused.status == Status::OK && is_finite(fused))
+    poses.filter(|fused| fused.status == Status::OK)
 }
 
-fn is_finite(fused: &FusedView) -> bool {
+/// Returns the position of a part; `None` if it is unknown.
+fn centre(fused: &FusedView, part: usize) -> Option<[f64; 2]> {
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
-    fused.centres_px[..n_parts].iter().flatten().all(|number| number.is_finite())
+    let centre = fused.centres_px[..n_parts].get(part).copied();
+    centre.filter(|centre| centre.iter().all(|side| side.is_finite()))
 }
 
 fn draw_single(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize) {
@@ -112,9 +114,8 @@ fn side_of(name: &str) -> Side {
 fn draw_lines(canvas: &mut Canvas, scene: &Scene, record: &FrameRecord, view: usize, part: usize) {
     let to = scene.views[view].framing.camera();
     for other in (0..scene.views.len()).filter(|i| *i != view) {
-        let pose = record.fused(other).filter(|fused| part < fused.n_parts as usize);
-        if let Some(fused) = pose.filter(|fused| is_finite(fused)) {
-            let point = Point2::from(fused.centres_px[part]);
+        if let Some(at) = record.fused(other).and_then(|fused| centre(fused, part)) {
+            let point = Point2::from(at);
             let curve = epipolar_curve(scene.views[other].framing.camera(), to, &point, N_POINTS);
             let curve: Vec<[f64; 2]> = curve.iter().map(|curve| [curve.x, curve.y]).collect();
             canvas.polyline(&curve, thin(canvas), ACCENT);

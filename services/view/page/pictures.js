@@ -79,7 +79,7 @@ export class Pictures {
     const { canvas, size } = this.views[nth];
     const at = [(event.offsetX / canvas.clientWidth) * size[0], (event.offsetY / canvas.clientHeight) * size[1]];
     const joints = this.momentOf(nth)?.views[nth]?.joints || [];
-    const far = joints.map((it) => Math.hypot(it[0] - at[0], it[1] - at[1]));
+    const far = joints.map((it) => it === null ? Infinity : Math.hypot(it[0] - at[0], it[1] - at[1]));
     const nearest = far.indexOf(Math.min(...far));
     const isNear = nearest >= 0 && far[nearest] < NEAR * size[0];
     this.point = isNear ? null : [nth, at];
@@ -213,6 +213,7 @@ export class Pictures {
   drawLimbs(pen, joints, scale, colour) {
     if (!joints) return;
     for (const [from, to] of this.scene.limbs) {
+      if (!joints[from] || !joints[to]) continue;
       pen.strokeStyle = colour || COLOURS[sideOf(this.scene.joints[from], this.scene.joints[to])];
       pen.lineWidth = Math.max(2, 0.006 * pen.canvas.width);
       pen.beginPath();

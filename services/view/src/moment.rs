@@ -48,14 +48,14 @@ pub(crate) struct Other {
     /// Height of the person standing upright, in metres; `None` if unknown.
     pub stature: Option<f64>,
     /// Joints in every view, in pixels; `None` if a view has no pose.
-    pub views: Vec<Option<Vec<[f64; 2]>>>,
+    pub views: Vec<Option<Vec<Option<[f64; 2]>>>>,
 }
 
 /// Pose in one view.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(crate) struct Seen {
-    /// Joints, in pixels; `None` if there is no pose.
-    pub joints: Option<Vec<[f64; 2]>>,
+    /// Joints, in pixels; `None` if there is no pose, or for a joint whose position is unknown.
+    pub joints: Option<Vec<Option<[f64; 2]>>>,
     /// Reason why the view does not contribute to the result; `None` if it does.
     pub why: Option<String>,
     /// True if the view sees the person from behind.
@@ -136,8 +136,8 @@ fn stature(person: &SkeletonMessage) -> Option<f64> {
     Some(rounded(person.stature_m, 1e3)).filter(|metres| *metres > 0.0)
 }
 
-/// Returns the joints in a view, in pixels.
-fn in_pixels(scene: &Scene, fused: &FusedView) -> Option<Vec<[f64; 2]>> {
+/// Returns the joints in a view, in pixels; `None` for a joint whose position is unknown.
+fn in_pixels(scene: &Scene, fused: &FusedView) -> Option<Vec<Option<[f64; 2]>>> {
     let n_parts = (fused.n_parts as usize).min(MAX_PARTS);
     let joints = scene.joints_of(&fused.centres_px[..n_parts])?;
     Some(joints.into_iter().map(in_view).collect())
@@ -176,9 +176,10 @@ pub(crate) fn in_world(point: [f64; 3]) -> [f64; 3] {
     point.map(|point| rounded(point, 1e4))
 }
 
-/// Rounds a position to a tenth of a pixel.
-pub(crate) fn in_view(point: [f64; 2]) -> [f64; 2] {
-    point.map(|point| rounded(point, 10.0))
+/// Rounds a position to a tenth of a pixel; `None` if it is unknown.
+pub(crate) fn in_view(point: [f64; 2]) -> Option<[f64; 2]> {
+    let is_known = point.iter().all(|side| side.is_finite());
+    is_known.then(|| point.map(|side| rounded(side, 10.0)))
 }
 
 /// Rounds a covariance to a hundredth of a square millimetre; `None` if it is unknown.

@@ -142,7 +142,7 @@ impl<'a> Skeleton<'a> {
     }
 
     /// Returns the centres of the parts in the frame of a view after fusion, `[column, row]` in pixels. Empty if the view did not
-    /// contribute to the skeleton.
+    /// contribute to the skeleton; NaN for a part whose position is unknown.
     pub fn centres_px(self, view: usize) -> &'a [[f64; 2]] {
         let view = self.message.views.get(view);
         let seen = view.filter(|view| view.status == Status::OK);

@@ -38,7 +38,7 @@ pub struct FusedView {
     pub exchanged: u32,
     /// Number of valid centres.
     pub n_parts: u32,
-    /// Centre of every part, named by the person's left and right, in pixels of the frame.
+    /// Centre of every part, named by the person's left and right, in pixels of the frame; NaN if its position is unknown.
     pub centres_px: [[f64; 2]; MAX_PARTS],
     /// Score of the view's best single-view candidate.
     pub single_score: f64,

@@ -120,7 +120,8 @@ impl ExtrasStep {
             return None;
         }
         let joints = PARSE14.from_parts(&fused.pose.centres_px);
-        let longer_px = geometry::longer_side(joints.iter().copied())?;
+        let known = joints.iter().copied().filter(|joint| joint[0].is_finite());
+        let longer_px = geometry::longer_side(known)?;
         // The last people in the list may have no extra keypoints.
         let told = found.people.iter();
         let told = told.filter(|sighting| sighting.extras.len() == self.extras.len());

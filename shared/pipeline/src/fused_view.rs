@@ -6,7 +6,8 @@ use multiview::{Exchanges, FusedPose, ViewPlan, average, is_exchanged};
 /// One view after fusion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FusedView {
-    /// The pose combined from the poses of the view's pairs; parts are named by the person's left and right.
+    /// The pose combined from the poses of the view's pairs; parts are named by the person's left and right. A part without a position is
+    /// NaN.
     pub pose: FusedPose,
     /// True if the view sees the person from behind.
     pub exchanged: bool,

@@ -131,7 +131,7 @@ pub(crate) fn of_set(
     set.joints.iter().map(mean).collect()
 }
 
-/// Returns the positions of a person's parts in a view.
+/// Returns the positions of a person's parts in a view; NaN for a part next to joints without a position.
 ///
 /// * `places`: positions of the joints of `skeleton::PARSE14`.
 /// * `energy`: energy of the solution.
@@ -142,7 +142,6 @@ pub(crate) fn shown_in(
     energy: f64,
     single_score: f64,
 ) -> FusedView {
-    let [width, height] = plan.layout().image_size.map(|side| side as f64);
     let centre = |between: &Between| {
         let [above, below] = between.joints.map(|joint| places[joint]);
         let at = match (above, below) {
@@ -150,7 +149,7 @@ pub(crate) fn shown_in(
             (one, other) => one.or(other),
         };
         let pixel = at.and_then(|at| plan.camera().project(&at));
-        pixel.map_or([width / 2.0, height / 2.0], |pixel| [pixel.x, pixel.y])
+        pixel.map_or([f64::NAN; 2], |pixel| [pixel.x, pixel.y])
     };
     FusedView {
         pose: FusedPose {

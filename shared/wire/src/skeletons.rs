@@ -144,7 +144,9 @@ fn check_person(person: &SkeletonMessage) -> Result<(), WireError> {
     for view in person.listed_views() {
         let n = count("n_parts", view.n_parts as usize, MAX_PARTS)?;
         if view.status == Status::OK {
-            all_finite("centres", view.centres_px[..n].as_flattened())?;
+            let is_known = |centre: &&[f64; 2]| !centre.iter().all(|side| side.is_nan());
+            let mut known = view.centres_px[..n].iter().filter(is_known);
+            known.try_for_each(|centre| all_finite("centres", centre))?;
         }
     }
     let points = person.listed_joints().iter();
@@ -397,6 +399,11 @@ mod tests {
         assert!(refused(|person| person.joints[0].in_world[2] = f64::NAN));
         assert!(refused(
             |person| person.views[0].centres_px[1][0] = f64::INFINITY
+        ));
+        assert!(refused(|person| person.views[0].centres_px[1][0] = f64::NAN));
+        // The position of a part may be unknown.
+        assert!(!refused(
+            |person| person.views[0].centres_px[1] = [f64::NAN; 2]
         ));
         // Joints that were not found are not checked.
         assert!(!refused(|person| person.joints[1].in_world[0] = f64::NAN));

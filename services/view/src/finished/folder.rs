@@ -294,8 +294,8 @@ fn see(scene: &Scene, moment: &mut Moment, line: &ViewLine) {
         return;
     };
     let parts = line.fused.iter().flat_map(|pose| &pose.parts);
-    let centres: Option<Vec<[f64; 2]>> = parts.map(|part| Some([part.x?, part.y?])).collect();
-    let joints = centres.and_then(|centre| scene.joints_of(&centre));
+    let centres = parts.map(|part| [part.x, part.y].map(|side| side.unwrap_or(f64::NAN)));
+    let joints = scene.joints_of(&centres.collect::<Vec<_>>());
     if let Some(seen) = moment.views.get_mut(view) {
         seen.joints = joints.map(|joint| joint.into_iter().map(in_view).collect());
         seen.behind = line.facing == Some(runfiles::Facing::Behind);
