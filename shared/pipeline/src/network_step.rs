@@ -202,7 +202,8 @@ impl NetworkStep {
         memory.until = until.map(|left| left.saturating_sub(1));
     }
 
-    /// Uses the people and keypoints that another program found in a frame; they are stored in the memory as after [`Self::look`].
+    /// Uses the people and keypoints that another program found in a frame; they are stored in the memory as after [`Self::look`]. If there
+    /// are more people than are kept, the largest and clearest are kept.
     ///
     /// * `people`: keypoints of every person, in pixels of the frame.
     pub fn take<P: AsRef<[Option<Keypoint>]>>(
@@ -216,9 +217,6 @@ impl NetworkStep {
             return;
         };
         for keypoints in people {
-            if memory.n_seen == self.settings.n_people {
-                break;
-            }
             let (_, seen) = memory.next();
             let NetworkSettings {
                 maps,
@@ -228,8 +226,12 @@ impl NetworkStep {
             (seen.turn, seen.colour) = (Turn::Up, None);
             let is_there = seen.maps.of_keypoints(keypoints.as_ref(), rows, maps, *keypoint_sigma);
             if is_there && seen.judge(self.size, self.settings.least_heat) {
+                seen.outline = seen.maps.around().unwrap_or_default();
                 memory.n_seen += 1;
             }
+        }
+        if memory.n_seen > self.settings.n_people {
+            memory.keep_largest(self.settings.n_people);
         }
     }
 
@@ -309,4 +311,38 @@ fn find(
     let weight = |found: &keypoints::PersonBox| found.score * (found.outline[3] - found.outline[1]);
     found.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
     Ok(found.into_iter().map(|found| found.outline).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use keypoints::{LSP_14, joint_ways};
+
+    use super::*;
+
+    #[test]
+    fn of_more_people_than_are_kept_the_largest_stay() {
+        let names: Vec<String> = LSP_14.iter().map(|name| (*name).to_owned()).collect();
+        let settings = NetworkSettings {
+            n_people: 2,
+            ..NetworkSettings::default()
+        };
+        let step = NetworkStep::new(Eyes::Keypoints(joint_ways(&names)), [640, 480], settings);
+        // People next to each other, of these heights.
+        let heights = [40.0, 300.0, 60.0, 200.0];
+        let people = heights.iter().enumerate().map(|(nth, height)| {
+            let keypoint = |joint: usize| Keypoint {
+                at: [
+                    150.0 * nth as f64 + 9.0 * (joint % 3) as f64,
+                    50.0 + height * joint as f64 / 13.0,
+                ],
+                score: 0.9,
+            };
+            (0..N).map(|joint| Some(keypoint(joint))).collect::<Vec<_>>()
+        });
+        let mut memory = NetworkMemory::default();
+        step.take(people, &mut memory);
+        let seen = step.sightings(&mut memory);
+        let ankles: Vec<f64> = seen.iter().map(|sighting| sighting.joint(0).unwrap()[0]).collect();
+        assert_eq!(ankles, [150.0, 450.0]);
+    }
 }
