@@ -117,7 +117,7 @@ fn nearest(
             };
             both.map(distance).collect::<Vec<f64>>()
         })
-        .min_by(|a, b| sum(a).total_cmp(&sum(b)))
+        .min_by(|a, b| mean(a).total_cmp(&mean(b)))
 }
 
 /// Converts distances in a picture to metres, at the distance of the joints from the camera.
@@ -175,8 +175,15 @@ fn readings<'a>(
     })
 }
 
-fn sum(distances: &[f64]) -> f64 {
-    distances.iter().filter(|distance| distance.is_finite()).sum()
+/// Returns the mean of the finite distances, so that a candidate with few of the joints is not nearer for that; infinite if there is none.
+fn mean(distances: &[f64]) -> f64 {
+    let known = distances.iter().filter(|distance| distance.is_finite());
+    let (n, sum) = known.fold((0_u32, 0.0), |(n, sum), distance| (n + 1, sum + distance));
+    if n == 0 {
+        f64::INFINITY
+    } else {
+        sum / f64::from(n)
+    }
 }
 
 #[cfg(test)]
@@ -195,6 +202,12 @@ mod tests {
         let alone = (0.5e-4 + 0.09 + 4e-4_f64).sqrt();
         close(sd(&[0.01]), alone);
         close(sd(&[9.0, 8.0]), alone);
+    }
+
+    #[test]
+    fn a_candidate_without_common_joints_is_not_the_nearest() {
+        assert_eq!(mean(&[2.0, f64::NAN, 4.0]), 3.0);
+        assert_eq!(mean(&[f64::NAN; 2]), f64::INFINITY);
     }
 
     #[test]
