@@ -2,17 +2,17 @@
 
 use skeleton::body::{BONES, Joints, Kind};
 
-/// Maximum number of frames by which a mean length is weighted.
-const MOST_FRAMES: f64 = 100.0;
+/// Maximum number of bones by which a mean length is weighted.
+const MOST_BONES: f64 = 100.0;
 /// Minimum number of kinds of bones that two bodies must share to be compared.
-const LEAST_KINDS: usize = 6;
+pub(crate) const LEAST_KINDS: usize = 6;
 
 /// Mean lengths of a person's bones, in metres; left and right are averaged together.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Bones {
     /// Mean length of each kind of bone, in the order of `skeleton::body::Kind::ALL`; 0 if no bone of that kind was seen.
     pub mean_m: [f64; Kind::ALL.len()],
-    /// Number of frames by which each mean is weighted.
+    /// Number of bones by which each mean is weighted; left and right count separately.
     pub n: [f64; Kind::ALL.len()],
 }
 
@@ -22,7 +22,7 @@ impl Bones {
         for (nth, kind) in Kind::ALL.iter().enumerate() {
             let of_kind = BONES.iter().filter(|bone| bone.kind == *kind);
             for length in of_kind.filter_map(|bone| bone.length(joints)) {
-                self.n[nth] = (self.n[nth] + 1.0).min(MOST_FRAMES);
+                self.n[nth] = (self.n[nth] + 1.0).min(MOST_BONES);
                 self.mean_m[nth] += (length - self.mean_m[nth]) / self.n[nth];
             }
         }

@@ -37,14 +37,16 @@ pub struct Remembered {
 pub struct Memory {
     /// Highest id used so far; the next new person gets a higher id.
     pub last_id: u64,
+    /// Time at which the last frame was taken, in seconds; `None` before the first frame.
+    pub last_s: Option<f64>,
     /// The people, including those who have left.
     pub people: Vec<Remembered>,
 }
 
 impl Memory {
-    /// Returns the memory as plain numbers, for a file or a message: the last id, then the people.
+    /// Returns the memory as plain numbers, for a file or a message: the last id, the last time, then the people.
     pub fn to_numbers(&self) -> Vec<f64> {
-        let mut numbers = vec![self.last_id as f64];
+        let mut numbers = vec![self.last_id as f64, self.last_s.unwrap_or(f64::NAN)];
         for person in &self.people {
             person.push_to(&mut numbers);
         }
@@ -53,13 +55,14 @@ impl Memory {
 
     /// Reads the numbers written by [`to_numbers`](Self::to_numbers); `None` if they are not a valid memory.
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
-        let (last_id, people) = numbers.split_first()?;
+        let (&[last_id, last_s], people) = numbers.split_first_chunk()?;
         let (people, []) = people.as_chunks::<NUMBERS_OF_PERSON>() else {
             return None;
         };
         let people = people.iter().map(Remembered::read);
         Some(Self {
-            last_id: id(*last_id)?,
+            last_id: id(last_id)?,
+            last_s: Some(last_s).filter(|last_s| last_s.is_finite()),
             people: people.collect::<Option<_>>()?,
         })
     }

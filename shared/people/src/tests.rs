@@ -280,6 +280,29 @@ fn a_returning_person_is_recognised_by_bone_lengths_and_a_stranger_is_not() {
 }
 
 #[test]
+fn a_person_who_has_left_is_not_expected_after_a_restart() {
+    let mut random = Rng::with_seed(2);
+    let at = |stature: f64| Actor {
+        at: [0.2, 0.0],
+        turn: 1.0,
+        stature,
+    };
+    let mut tracker = Tracker::new(ring(4), settings());
+    let time_s = |nth: usize| nth as f64 / RATE_HZ;
+    for nth in 0..80 {
+        let people = if nth < 40 { vec![at(1.9)] } else { Vec::new() };
+        tracker.step(time_s(nth), &seen(&ring(4), &people, 2.0, &mut random));
+    }
+    let memory = Memory::from_numbers(&tracker.memory().to_numbers()).unwrap();
+    let mut tracker = Tracker::resume(ring(4), settings(), &memory);
+    let people = tracker.step(time_s(80), &seen(&ring(4), &[at(1.5)], 2.0, &mut random));
+    assert_eq!(
+        people.iter().map(|person| person.id).collect::<Vec<u64>>(),
+        [2]
+    );
+}
+
+#[test]
 fn a_new_person_is_reported_in_the_third_frame_or_at_once_if_nobody_was_known() {
     let mut random = Rng::with_seed(3);
     let [one, other] = [[-0.8, 0.0], [0.8, 0.0]].map(|at| Actor {

@@ -4,6 +4,7 @@ use geometry::Camera;
 use skeleton::body::Joints;
 
 use crate::assignment::{NEVER, assign};
+use crate::bones::LEAST_KINDS;
 use crate::cluster::{Member, clusters};
 use crate::coarse::{Coarse, agree};
 use crate::colour::difference;
@@ -30,10 +31,10 @@ const OTHER_BONES: f64 = 0.15;
 const DEATH_S: f64 = 1.0;
 /// A person can be recognised for this time after being dropped, in seconds.
 const REMEMBERED_S: f64 = 60.0;
-/// Limits for recognising a person: maximum mean difference of the logarithms of the bone lengths, minimum number of frames, and maximum
-/// difference of the trunk colours.
+/// Limits for recognising a person: maximum mean difference of the logarithms of the bone lengths, minimum number of bones of one kind, and
+/// maximum difference of the trunk colours.
 const SAME_BONES: f64 = 0.06;
-const FRAMES_TO_KNOW: f64 = 20.0;
+const BONES_TO_KNOW: f64 = 20.0;
 const SAME_COLOUR: f64 = 0.2;
 /// Factor in the cost of a detection whose colour fits another person nearby better, in metres per unit of colour difference; the next
 /// constant is the maximum distance of that other person, in metres.
@@ -86,19 +87,24 @@ impl Tracker {
         Self::resume(cameras, settings, &Memory::default())
     }
 
-    /// Creates a tracker that continues the work of another tracker.
+    /// Creates a tracker that continues the work of another tracker. Only the people whom that tracker was still following are expected;
+    /// the others can be recognised.
     pub fn resume(cameras: Vec<Camera>, settings: Settings, memory: &Memory) -> Self {
         let mut order: Vec<usize> = (0..cameras.len()).collect();
         order.sort_by(|a, b| cameras[*a].name.cmp(&cameras[*b].name));
         let last_id = memory.people.iter().map(|person| person.id).max();
+        let last_s = memory.last_s;
+        let is_gone =
+            |person: &&Remembered| last_s.is_some_and(|last_s| last_s - person.seen_s > DEATH_S);
+        let (gone, followed): (Vec<_>, Vec<_>) = memory.people.iter().partition(is_gone);
         Self {
             cameras,
             order,
             settings,
-            tracks: memory.people.iter().map(revived).collect(),
-            gone: Vec::new(),
+            tracks: followed.into_iter().map(revived).collect(),
+            gone: gone.into_iter().cloned().collect(),
             last_id: memory.last_id.max(last_id.unwrap_or(0)),
-            last_s: None,
+            last_s,
         }
     }
 
@@ -107,6 +113,7 @@ impl Tracker {
         let known = self.tracks.iter().filter_map(remembered);
         Memory {
             last_id: self.last_id,
+            last_s: self.last_s,
             people: known.chain(self.gone.iter().cloned()).collect(),
         }
     }
@@ -409,11 +416,11 @@ impl Tracker {
     /// Returns the dropped person with the same bones and the same colour.
     fn known_again(&self, track: &Track, time_s: f64) -> Option<usize> {
         let each = self.gone.iter().enumerate().filter_map(|(nth, person)| {
-            let n = person.bones.n.iter().copied().fold(f64::INFINITY, f64::min);
+            let n_known = person.bones.n.iter().filter(|n| **n >= BONES_TO_KNOW).count();
             let bones = track.bones.difference(&person.bones)?;
             let colour = track.colours.overall().zip(person.colour);
             let colour = colour.map_or(0.0, |(new, old)| difference(new, old));
-            let is_same = n >= FRAMES_TO_KNOW && bones < SAME_BONES && colour < SAME_COLOUR;
+            let is_same = n_known >= LEAST_KINDS && bones < SAME_BONES && colour < SAME_COLOUR;
             let is_past = time_s > person.seen_s;
             (is_same && is_past).then_some((nth, bones / SAME_BONES + colour / SAME_COLOUR))
         });
