@@ -66,6 +66,7 @@ impl Default for WhoSettings {
 pub struct WhoStep {
     tracker: Tracker,
     follow: Follow,
+    n_people: usize,
     /// Id of the followed person; 0 before the first person.
     followed: u64,
 }
@@ -77,7 +78,7 @@ impl WhoStep {
     pub fn new(cameras: Vec<Camera>, settings: WhoSettings) -> Self {
         let memory = Memory {
             last_id: settings.n_restarts * IDS_OF_A_PROCESS,
-            people: Vec::new(),
+            ..Memory::default()
         };
         Self::remembering(cameras, settings, &memory, 0)
     }
@@ -115,11 +116,13 @@ impl WhoStep {
         Self {
             tracker: Tracker::resume(cameras, of_tracker, memory),
             follow: settings.follow,
+            n_people: settings.n_people,
             followed,
         }
     }
 
-    /// Returns the people of the next frame.
+    /// Returns the people of the next frame, at most [`WhoSettings::n_people`]: somebody who was hidden may return after another person took
+    /// the last place. The followed person and the lowest ids come first.
     ///
     /// * `time_s`: time at which the frame was taken, in seconds; not earlier than the time of the last frame.
     /// * `answers`: the sightings of each view.
@@ -135,6 +138,7 @@ impl WhoStep {
         found.retain(|person| is_seen(person) || (person.id == followed && n_seen > 0));
         // Sort by id, but put the followed person first.
         found.sort_by_key(|person| (person.id != followed, person.id));
+        found.truncate(self.n_people);
         let known = |person: Person| KnownPerson {
             candidates: if is_seen(&person) {
                 person.detections

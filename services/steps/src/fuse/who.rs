@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use failure::{ExitKind, Failure, OrFail as _, now_nanos};
 use geometry::Camera;
-use messages::{MAX_PEOPLE, Sightings, Span, topic};
+use messages::{Sightings, Span, topic};
 use pipeline::{ViewSightings, WhoSettings, WhoStep, time_s};
 use runtime::{Place, Service};
 use stage::{Frame, Stage};
@@ -58,9 +58,7 @@ pub fn run_who(service: &Service, job: &WhoJob) -> Result<(), Failure> {
         let present = present.filter(|(_, answer)| answer.is_some());
         let present = present.fold(0, |mask, (view, _)| mask | 1_u32 << view);
         frame.turn().restart(now_nanos());
-        let mut found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
-        // Somebody who was hidden may return to a full room. The followed person and the oldest identities come first.
-        found.people.truncate(MAX_PEOPLE);
+        let found = step.run(time_s(frame.number(), job.frame_rate_hz), &answers);
         // The identities are saved before they are sent, so that a restarted process knows every identity that was sent.
         is_noted = note(&mut place, &step, is_noted);
         let message = wire::people_to_message(&found, present).or_fail(ExitKind::Run)?;

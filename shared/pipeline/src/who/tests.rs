@@ -76,6 +76,29 @@ fn ids(frame: &FramePeople) -> Vec<u64> {
 }
 
 #[test]
+fn no_more_people_are_reported_than_wanted() {
+    let three = [[-1.2, 0.0], [0.0, 0.8], [1.2, 0.0]].map(|place| (place, 0.9));
+    let all: Vec<&[([f64; 2], f32)]> = vec![&three; 20];
+    let n_of = |n_people: usize| {
+        let settings = WhoSettings {
+            n_people,
+            ..WhoSettings::default()
+        };
+        let cameras: Vec<Camera> = (0..N_VIEWS).map(camera).collect();
+        let mut step = WhoStep::new(cameras.clone(), WhoSettings::default());
+        all.iter().enumerate().for_each(|(frame, people)| {
+            step.run(frame as f64 / RATE_HZ, &seen(people));
+        });
+        // A process with other settings continues with all three people.
+        let mut step = WhoStep::resume(cameras, settings, &step.memory()).unwrap();
+        let found = step.run(all.len() as f64 / RATE_HZ, &seen(&three));
+        (ids(&found), found.n_seen)
+    };
+    assert_eq!(n_of(3), (vec![1, 2, 3], 3));
+    assert_eq!(n_of(2), (vec![1, 2], 3));
+}
+
+#[test]
 fn everybody_is_reported_with_their_candidate_in_every_view() {
     let both: &[([f64; 2], f32)] = &[([-0.6, 0.0], 0.9), ([0.9, 0.4], 0.7)];
     let frames = run(Follow::Last, &[both; 4]);
