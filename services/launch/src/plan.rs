@@ -7,7 +7,7 @@ use steps::quality;
 
 use deployment::hosts::Host;
 use deployment::{Content, Deployment, Process, Room, Stage, Topology, ViewSize};
-use failure::{ExitKind, Failure, OrFail as _, now_nanos};
+use failure::{ExitKind, Failure, OrFail as _};
 use messages::{
     EvidenceHeader, FrameHeader, PairPose, People, PictureHeader, Sightings, Skeletons, ViewQuality,
 };
@@ -262,6 +262,7 @@ fn process(
         // Stages that write files have no limit, because their work varies. With lossless delivery, no stage has a limit, because there are
         // no deadlines.
         most_work: (is_realtime && is_comparable).then_some(MAX_WORK_FACTOR),
+        completes_files: ["results", "record"].contains(&process.service),
     }
 }
 
@@ -269,16 +270,17 @@ fn process(
 ///
 /// * `file`: path of the resolved deployment in the output folder.
 /// * `log`: the log level of the processes.
+/// * `session`: start of the run.
 pub(crate) fn plan(
     resolved: &Resolved,
     prepared: &Prepared,
     file: &Path,
-    log: Level,
+    (log, session): (Level, u64),
 ) -> Result<Plan, Failure> {
     let processes = processes(resolved, file);
     let names: Vec<String> = processes.iter().map(|process| process.name.clone()).collect();
     let settings = &resolved.deployment.supervise;
-    let session = now_nanos();
+    let hang_limit = Duration::from_secs(resolved.deployment.hang_limit_s());
     Ok(Plan {
         executable: executable()?,
         given: resolved.to_text()?.into_bytes(),
@@ -291,7 +293,8 @@ pub(crate) fn plan(
         policy: Policy {
             max_restarts: settings.max_restarts as usize,
             restart_window: RESTART_WINDOW,
-            hang_limit: Duration::from_secs(resolved.deployment.hang_limit_s()),
+            hang_limit,
+            startup_limit: Policy::default().startup_limit.max(hang_limit),
             stopped_limit: HEARTBEAT * settings.missed_beats,
             ..Policy::default()
         },

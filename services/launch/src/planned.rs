@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use deployment::Deployment;
-use failure::{Claim, Failure, Stop};
+use failure::{Claim, Failure, Stop, now_nanos};
 use runtime::Scheduling;
 use supervise::{Event, Plan};
 use tracing::Level;
@@ -32,19 +32,31 @@ impl Planned {
     ///
     /// # Errors
     ///
-    /// Fails if an input cannot be read or used; see [`plan::resolve`] and [`Self::of`].
+    /// Fails if an input cannot be read or used; see [`plan::resolve`] and [`Self::begun`].
     pub fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
         Self::of(plan::resolve(deployment)?, log)
     }
 
-    /// Plans the processes and topics of a resolved deployment.
+    /// Plans the processes and topics of a resolved deployment whose run begins here.
     ///
     /// * `log`: the log level of its processes.
     ///
     /// # Errors
     ///
-    /// Fails if the model, calibration, network or table of expected errors cannot be read or used.
+    /// Fails in the same cases as [`Self::begun`].
     pub fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
+        Self::begun(resolved, log, None)
+    }
+
+    /// Plans the processes and topics of a resolved deployment.
+    ///
+    /// * `log`: the log level of its processes.
+    /// * `session`: start of the run according to the fusing host; `None` if the run begins here.
+    ///
+    /// # Errors
+    ///
+    /// Fails if the model, calibration, network or table of expected errors cannot be read or used.
+    pub fn begun(resolved: Resolved, log: Level, session: Option<u64>) -> Result<Self, Failure> {
         let prepared = Prepared::new(&resolved)?;
         prepared.check_predictions(&resolved)?;
         let file = resolved_file(&resolved.deployment);
@@ -54,7 +66,8 @@ impl Planned {
         if let Some(small) = resolved.search_size.as_ref().and_then(SearchSize::warning) {
             tracing::warn!("{small}");
         }
-        let mut plan = plan::plan(&resolved, &prepared, &file, log)?;
+        let session = session.unwrap_or_else(now_nanos);
+        let mut plan = plan::plan(&resolved, &prepared, &file, (log, session))?;
         for warning in scheduling::remove_denied(&mut plan.processes, Scheduling::rehearse) {
             tracing::warn!("{warning}");
         }
@@ -79,15 +92,6 @@ impl Planned {
     /// Returns the names of the processes.
     pub fn processes(&self) -> impl Iterator<Item = &str> {
         self.plan.processes.iter().map(|process| process.name.as_str())
-    }
-
-    /// Returns the same run, but with the start time that another host has set.
-    ///
-    /// * `session`: start of the run according to the fusing host; `None` if the run starts here.
-    #[must_use]
-    pub fn begun(mut self, session: Option<u64>) -> Self {
-        self.plan.session = session.unwrap_or(self.plan.session);
-        self
     }
 
     /// Makes a process enter an endless loop in epoch 0, after it has sent a message about a frame later than `after_frame`.

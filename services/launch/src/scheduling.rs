@@ -75,6 +75,7 @@ mod tests {
             senders: Vec::new(),
             scheduling: scheduling.parse().unwrap(),
             most_work: None,
+            completes_files: false,
         }
     }
 

@@ -44,6 +44,19 @@ pub enum Death {
     NotStarted,
 }
 
+impl Death {
+    /// Returns the time in which the process did nothing before it was killed.
+    pub(crate) fn idle(&self) -> Duration {
+        match *self {
+            Self::Hung { still } | Self::Silent { still } => still,
+            Self::NeverBegan { waited } => waited,
+            Self::Exit { .. } | Self::Signal { .. } | Self::Spun { .. } | Self::NotStarted => {
+                Duration::ZERO
+            }
+        }
+    }
+}
+
 impl fmt::Display for Death {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -128,4 +141,16 @@ pub enum Event<'a> {
     },
     /// The stop request is sent to all processes.
     Stopping,
+    /// A process still writes its files some time after the stop request. The run waits for it.
+    Awaited {
+        /// Name of the process.
+        process: &'a str,
+    },
+    /// A process did not end after the stop request, and was killed.
+    Killed {
+        /// Name of the process.
+        process: &'a str,
+        /// Time since the stop request.
+        waited: Duration,
+    },
 }

@@ -52,6 +52,8 @@ pub struct ProcessSpec {
     /// longer counts as an endless loop. The limit applies once the process has sent a few messages. `None` if the iterations are not
     /// comparable.
     pub most_work: Option<u32>,
+    /// True if the process completes its files after the stop request. It may take as long for this as a main loop may hang.
+    pub completes_files: bool,
 }
 
 /// Consequence for the run when a process has been given up.
@@ -91,7 +93,7 @@ pub struct Policy {
     /// Longest time that a process may wait without receiving a message. It applies only when other processes have finished, and at least
     /// one process was restarted or given up.
     pub idle_limit: Duration,
-    /// Time that processes have to end after the stop request.
+    /// Time that processes have to end after the stop request, except those that complete files.
     pub grace: Duration,
     /// Interval between clean-ups after dead processes. There is also a clean-up at every death.
     pub clean_period: Duration,

@@ -428,11 +428,10 @@ impl Supervisor<'_> {
         (self.on_event)(Event::Stopping);
         self.watches.iter().filter_map(Watch::child).for_each(Child::terminate);
         let begin = Instant::now();
-        let mut is_repeated = false;
+        let (mut is_repeated, mut is_late) = (false, false);
         while self.watches.iter().any(|watch| watch.child().is_some()) {
             let now = Instant::now();
             let waited = now.saturating_duration_since(begin);
-            let patient = waited < self.plan.policy.grace;
             // Two signals that arrive at the same time may merge into one, which may name the other process as its sender. Therefore, the
             // signal is repeated.
             if !is_repeated && REPEAT_STOP.contains(&waited) {
@@ -441,7 +440,15 @@ impl Supervisor<'_> {
             }
             for index in 0..self.watches.len() {
                 self.receive(index, now);
-                self.release(index, patient);
+                self.release(index, waited);
+            }
+            if !is_late && waited >= self.plan.policy.grace {
+                is_late = true;
+                for watch in self.watches.iter().filter(|watch| watch.child().is_some()) {
+                    (self.on_event)(Event::Awaited {
+                        process: &watch.spec.name,
+                    });
+                }
             }
             if let Err(error) = self.sleep(TURN, None) {
                 tracing::warn!(%error, "cannot wait for the processes to end");
@@ -451,13 +458,27 @@ impl Supervisor<'_> {
     }
 
     /// Releases a process that has ended, or whose time is over.
-    fn release(&mut self, index: usize, patient: bool) {
+    ///
+    /// * `waited`: time since the stop request.
+    fn release(&mut self, index: usize, waited: Duration) {
+        let policy = &self.plan.policy;
         let watch = &mut self.watches[index];
         let Phase::Running(child) = &mut watch.phase else {
             return;
         };
-        if matches!(child.try_wait(), Ok(None)) && patient {
-            return;
+        if matches!(child.try_wait(), Ok(None)) {
+            let limit = if watch.spec.completes_files {
+                policy.grace.max(policy.hang_limit)
+            } else {
+                policy.grace
+            };
+            if waited < limit {
+                return;
+            }
+            (self.on_event)(Event::Killed {
+                process: &watch.spec.name,
+                waited,
+            });
         }
         self.receive(index, Instant::now());
         self.watches[index].end();

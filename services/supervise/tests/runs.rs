@@ -80,6 +80,19 @@ fn a_process_that_ignores_the_stop_request_is_killed() {
     let run = case.run(|_, _| {});
     assert!(!is_alive(run.pids("rock")[0]));
     assert_eq!(run.outcome().processes[0].state, State::Finished);
+    assert!(run.events.contains(&Recorded::Killed("rock".to_owned())));
+}
+
+#[test]
+fn a_process_that_completes_files_has_more_time_after_the_stop_request() {
+    let mut case = Case::new(Delivery::Realtime, &[("rock", "stubborn", Role::Essential)]);
+    case.plan.policy.grace = Duration::from_millis(100);
+    case.plan.policy.hang_limit = Duration::from_secs(2);
+    case.plan.processes[0].completes_files = true;
+    let run = case.run(|_, _| {});
+    let at = |event: Recorded| run.events.iter().position(|other| *other == event).unwrap();
+    let rock = || "rock".to_owned();
+    assert!(at(Recorded::Awaited(rock())) < at(Recorded::Killed(rock())));
 }
 
 #[test]

@@ -87,6 +87,15 @@ impl Watcher {
                     "{process} is stopped, because no process sends to it any more"
                 ));
             }
+            Event::Awaited { process } => {
+                self.print(&format!("waiting for {process}, which completes its files"));
+            }
+            Event::Killed { process, waited } => {
+                let waited_s = waited.as_secs_f64();
+                self.print(&format!(
+                    "{process} did not end within {waited_s:.0} s of the stop request, and was killed"
+                ));
+            }
             _ => {}
         }
     }

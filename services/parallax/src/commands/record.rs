@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
         recording: Some(RecordingPlan { pictures, ..plan }),
         ..resolved
     };
-    let planned = Planned::of(resolved, globals.level())?.begun(session);
+    let planned = Planned::begun(resolved, globals.level(), session)?;
     let forecast = forecast(&planned, &file, arguments)?;
     forecast.check(&file)?;
     remove_existing(&file, arguments.force)?;

@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(device) = device.filter(|_| !globals.quiet) {
         output::message(device);
     }
-    let planned = Planned::of(resolved, globals.level())?.begun(session);
+    let planned = Planned::begun(resolved, globals.level(), session)?;
     if arguments.dry_run {
         if let Some(size) = &planned.resolved().search_size {
             output::line(size.text())?;

@@ -27,6 +27,8 @@ pub(crate) enum Recorded {
     GivenUp(String, u32),
     Dismissed(String),
     Stopping,
+    Awaited(String),
+    Killed(String),
 }
 
 /// A deployment in a folder of its own.
@@ -61,6 +63,7 @@ impl Case {
             senders: Vec::new(),
             scheduling: Scheduling::default(),
             most_work: None,
+            completes_files: false,
         });
         let health = processes.iter().flat_map(|&(name, _, _)| process_topics(name));
         let plan = Plan {
@@ -192,6 +195,8 @@ fn note(event: &Event<'_>) -> Option<Recorded> {
         Event::GivenUp { process, restarts } => Recorded::GivenUp((*process).to_owned(), *restarts),
         Event::Dismissed { process } => Recorded::Dismissed((*process).to_owned()),
         Event::Stopping => Recorded::Stopping,
+        Event::Awaited { process } => Recorded::Awaited((*process).to_owned()),
+        Event::Killed { process, .. } => Recorded::Killed((*process).to_owned()),
         Event::Health { .. } => return None,
     })
 }

@@ -28,6 +28,7 @@ fn try_supervise(base: &Path) -> Result<(), Failure> {
         senders: Vec::new(),
         scheduling: Scheduling::default(),
         most_work: None,
+        completes_files: false,
     });
     let plan = Plan {
         executable: "/proc/self/exe".into(),
