@@ -27,8 +27,7 @@ pub(crate) struct Watch {
     pub(crate) metrics: Subscriber<Metrics>,
     pub(crate) phase: Phase,
     pub(crate) epoch: u32,
-    /// Times of restarts within the window.
-    restarts: VecDeque<Instant>,
+    restarts: Restarts,
     /// Time of the first iteration of the main loop since the last start.
     at_work_since: Option<Instant>,
     /// True if the main loop ran before an earlier restart, which shows that the input was usable.
@@ -118,6 +117,22 @@ impl Work {
     }
 }
 
+/// Times of recent restarts. The time in which the process did nothing before it was killed is not counted: a process that hangs for
+/// longer than the window after every restart would never be given up.
+#[derive(Debug, Default)]
+struct Restarts(VecDeque<Instant>);
+
+impl Restarts {
+    /// Returns the number of restarts within the window.
+    ///
+    /// * `idle`: time in which the process did nothing before it died.
+    fn n_recent(&mut self, idle: Duration, window: Duration, now: Instant) -> usize {
+        self.0.iter_mut().for_each(|restart| *restart += idle);
+        self.0.retain(|restart| now.saturating_duration_since(*restart) <= window);
+        self.0.len()
+    }
+}
+
 /// Consequence of a death.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sequel {
@@ -143,7 +158,7 @@ impl Watch {
             metrics,
             phase: Phase::Due(now),
             epoch: 0,
-            restarts: VecDeque::new(),
+            restarts: Restarts::default(),
             at_work_since: None,
             has_worked: false,
             n_hasty: 0,
@@ -286,20 +301,16 @@ impl Watch {
             self.phase = Phase::GivenUp;
             return Sequel::Fail(kind);
         }
-        while let Some(&first) = self.restarts.front()
-            && now.saturating_duration_since(first) > policy.restart_window
-        {
-            self.restarts.pop_front();
-        }
+        let n_recent = self.restarts.n_recent(death.idle(), policy.restart_window, now);
         self.has_worked |= self.at_work_since.is_some();
         let worked = |since| now.saturating_duration_since(since) >= policy.steady_after;
         let is_steady = self.at_work_since.is_some_and(worked);
         self.n_hasty = if is_steady { 0 } else { self.n_hasty + 1 };
-        let Some(pause) = policy.pause(self.restarts.len(), self.n_hasty) else {
+        let Some(pause) = policy.pause(n_recent, self.n_hasty) else {
             self.phase = Phase::GivenUp;
             return Sequel::GiveUp;
         };
-        self.restarts.push_back(now);
+        self.restarts.0.push_back(now);
         self.epoch += 1;
         self.phase = Phase::Due(now + pause);
         Sequel::Restart(pause)
@@ -434,6 +445,19 @@ mod tests {
             (work.since_iteration, work.longest),
             (millis(0), millis(180))
         );
+    }
+
+    #[test]
+    fn the_time_of_a_hang_does_not_count_against_the_window_of_restarts() {
+        let secs = Duration::from_secs;
+        let mut now = Instant::now();
+        let mut restarts = Restarts::default();
+        for nth in 0..3 {
+            assert_eq!(restarts.n_recent(secs(120), secs(60), now), nth);
+            restarts.0.push_back(now);
+            now += secs(121);
+        }
+        assert_eq!(restarts.n_recent(Duration::ZERO, secs(60), now), 0);
     }
 
     #[test]

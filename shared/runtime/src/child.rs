@@ -127,7 +127,10 @@ impl Child {
     /// Fails if the process does not exist any more.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
         let mut fds = [PollFd::from_borrowed_fd(self.pidfd.as_fd(), PollFlags::IN)];
-        let ended = poll(&mut fds, Some(&Timespec::default()))? > 0;
+        let ended = match poll(&mut fds, Some(&Timespec::default())) {
+            Err(Errno::INTR) => return Ok(None),
+            ended => ended? > 0,
+        };
         if ended {
             // Kill the children before the process is reaped: until then, its id cannot belong to another process.
             self.kill();

@@ -179,7 +179,7 @@ impl Health {
         self.counts.meter(|meter| meter.queued(n));
     }
 
-    /// Records the number of frames that wait for a message of another view. A process with such frames is not idle.
+    /// Records the number of frames that wait for a message of another view, or are being processed. A process with such frames is not idle.
     pub fn waits(&self, n: usize) {
         self.counts.n_waiting.store(n as u64, Ordering::Relaxed);
     }

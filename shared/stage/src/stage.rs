@@ -356,6 +356,8 @@ impl<'a, T: 'a> Stage<'a, T> {
         let Joined { frame, items } = joined;
         let received_at = now_nanos();
         self.service.health().queued(inbox.n_pending());
+        // While this frame is processed, the process is not idle, however long it takes.
+        self.service.health().waits(inbox.n_pending() + 1);
         self.service.progress().tick();
         for held in &self.held {
             held.fill(context)?;
