@@ -195,8 +195,13 @@ impl Receiving<'_> {
         };
         let remote = &self.remotes[self.views[index].remote];
         let Some(clock) = remote.estimate(now_nanos()) else {
-            // The clock of the host is not known yet, so the message cannot be assigned to a frame.
+            // The clock of the host is not known yet, so the message cannot be assigned to a frame. After the end, none can.
             remote.count_without_clock();
+            if arrived.head.status == Status::END {
+                let it = &mut self.views[index];
+                it.end = Some(it.arrivals.next());
+                return self.end_if_over(index);
+            }
             return Ok(());
         };
         let (service, job) = (self.service, self.job);
@@ -216,7 +221,7 @@ impl Receiving<'_> {
             return it.publisher.send(service, job.frame(nth), arrived, &times(nth));
         }
         if arrived.head.status == Status::END {
-            let end = it.arrivals.nearest(instant).clamp(it.arrivals.next(), self.role.n_frames);
+            let end = it.arrivals.nearest(instant).min(self.role.n_frames).max(it.arrivals.next());
             it.end = Some(end);
             return self.end_if_over(index);
         }
