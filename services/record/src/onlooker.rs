@@ -50,6 +50,7 @@ pub fn look_on(
     let (inlet, outlet) = queue(channels.len(), job.queue_bytes);
     let mut recorder = Recorder::open(bus, &channels, &job, &inlet, &mut bus.waiter())?;
     recorder.session = session;
+    recorder.begin_late();
     let names = channels.iter().map(|channel| channel.name.clone());
     let mut about = job.about;
     about.session = session;

@@ -161,6 +161,11 @@ impl<'a> Recorder<'a> {
         })
     }
 
+    /// Notes that the run began before the recording.
+    pub(crate) fn begin_late(&mut self) {
+        self.sent.fill(Sent::late());
+    }
+
     /// Receives all waiting messages.
     pub(crate) fn receive_all(&mut self) -> Result<(), Failure> {
         for topic in 0..self.receivers.len() {
