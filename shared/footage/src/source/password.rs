@@ -47,12 +47,27 @@ fn is_end(it: char) -> bool {
     it.is_whitespace() || it == '"'
 }
 
+/// Returns the position at which the host of an address ends, with its port.
+///
+/// * `address`: the address without its scheme.
+fn end_of_host(address: &str) -> usize {
+    let separators = ['/', '?', '#'];
+    let end = address.find(separators).unwrap_or(address.len());
+    let host = &address[..end];
+    // Text after a colon that is not a port is part of a password with separators.
+    let is_password = !host.contains(['@', ']'])
+        && host.split_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_err());
+    match address.rfind('@').filter(|_| is_password) {
+        Some(at) => address[at..].find(separators).map_or(address.len(), |after| at + after),
+        None => end,
+    }
+}
+
 /// Appends an address without its secrets.
 ///
 /// * `address`: the address without its scheme.
 fn push_address(out: &mut String, address: &str) {
-    let end = address.find(['/', '?', '#']).unwrap_or(address.len());
-    let (host, path) = address.split_at(end);
+    let (host, path) = address.split_at(end_of_host(address));
     out.push_str(host.rsplit_once('@').map_or(host, |parts| parts.1));
     let Some((path, query)) = path.split_once('?') else {
         out.push_str(path);
@@ -78,7 +93,7 @@ pub(crate) fn without_password_of(address: &str, message: &str) -> String {
     let shown = without_passwords(address);
     let mut message = without_passwords(&message.replace(address, &shown));
     let host = address.split_once("://").map_or("", |parts| parts.1);
-    let host = &host[..host.find(['/', '?', '#']).unwrap_or(host.len())];
+    let host = &host[..end_of_host(host)];
     let before = host.rsplit_once('@').map_or("", |parts| parts.0);
     let password = before.split_once(':').map_or("", |parts| parts.1);
     for secret in [before, password] {
@@ -102,6 +117,8 @@ mod tests {
             ("udp://@:5000", "udp://:5000"),
             ("rtsp://me:secret@10.0.0.5:554/a", "rtsp://10.0.0.5:554/a"),
             ("rtsp://me:s@cret@10.0.0.5", "rtsp://10.0.0.5"),
+            ("rtsp://me:se/c?r#et@10.0.0.5/a", "rtsp://10.0.0.5/a"),
+            ("rtsp://10.0.0.5:554/a@b", "rtsp://10.0.0.5:554/a@b"),
             (
                 "http://c/v.cgi?user=me&PWD=888&res=1",
                 "http://c/v.cgi?user=***&PWD=***&res=1",
@@ -130,6 +147,8 @@ mod tests {
             "rtsp://10.0.0.5/a: no"
         );
         assert_eq!(hidden("tcp://secret"), "tcp://***");
+        let odd = without_password_of("rtsp://me:s/ret@10.0.0.5/a", "auth s/ret failed");
+        assert_eq!(odd, "auth *** failed");
         assert_eq!(without_password_of("rtsp://a/b", "as it is"), "as it is");
     }
 
