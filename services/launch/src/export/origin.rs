@@ -102,10 +102,10 @@ impl Origin {
                 TrialError::Empty | TrialError::NoPoint { .. } => ExitKind::Degraded,
                 TrialError::Joints(_) | TrialError::Range { .. } => ExitKind::Input,
             };
-            Failure::new(
-                kind,
-                format!("{}: {error}; nothing was written", source.display()),
-            )
+            // A part of the run may be missing.
+            let why = flaws.iter().map(|flaw| format!("\n  {flaw}")).collect::<String>();
+            let message = format!("{}: {error}; nothing was written{why}", source.display());
+            Failure::new(kind, message)
         })?;
         // All trials have the same frames and times.
         check_rate(&trials[0], given)?;
