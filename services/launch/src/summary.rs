@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use exports::report::run::Verdict;
 use failure::{ExitKind, Failure};
 use messages::Refusal;
-use runfiles::{CameraFit, Doubt, LatencyReport, Summary};
+use runfiles::{CameraFit, LatencyReport, Summary};
 use runtime::metrics::Reading;
 use serde_json::{Value, json};
 use supervise::Outcome;
@@ -213,10 +213,8 @@ impl Report {
                 || self.views.iter().any(|view| view.is_lost(self.is_lossless)))
     }
 
-    /// Returns the reasons not to trust the results, which were found in the results themselves.
-    fn doubts(&self) -> Vec<Doubt> {
-        let summary = self.recorded.summary();
-        summary.map_or_else(Vec::new, |summary| summary.trust.doubts())
+    fn doubts(&self) -> Vec<String> {
+        self.recorded.summary().map_or_else(Vec::new, trust::doubts)
     }
 
     /// Returns true if frames were lost, or if the cameras contradict each other.
@@ -283,7 +281,7 @@ impl Report {
             "interrupted": self.interrupted,
             "degraded": self.is_degraded(),
             "no_results": self.no_results_reason(),
-            "doubts": self.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "doubts": self.doubts(),
             "given_up": self.given_up,
             "restarts": self.restarts.iter().map(|(name, n)| json!({ "process": name, "restarts": n })).collect::<Vec<_>>(),
             "peak_memory_bytes": self.peaks.iter().cloned().collect::<BTreeMap<_, _>>(),

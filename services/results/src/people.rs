@@ -100,6 +100,13 @@ impl Counted {
         limbs: &[(usize, usize)],
         time_s: Option<f64>,
     ) {
+        if person.status == Status::IMPLAUSIBLE {
+            // Somebody whose bodies were all impossible has no summary.
+            if let Some(one) = self.each.get_mut(&person.id) {
+                one.trusted.count(person, limbs, (time_s, &[]));
+            }
+            return;
+        }
         if person.status != Status::OK {
             return;
         }
@@ -207,6 +214,8 @@ mod tests {
             person.id = id;
             counted.person(frame, &person, &[], Some(time_s));
         }
+        person.status = Status::IMPLAUSIBLE;
+        counted.person(901, &person, &[], Some(90.1));
         counted.forget(90.0);
         assert_eq!(counted.each.keys().copied().collect::<Vec<_>>(), [9]);
         let each = counted.people().each;
@@ -214,5 +223,9 @@ mod tests {
         let expected = [(7, 2, 4, 5), (8, 1, 5, 5), (9, 1, 900, 900)];
         assert_eq!(each.iter().map(told).collect::<Vec<_>>(), expected);
         assert_eq!((each[0].joints, each[0].reprojection_px), (0.5, Some(3.0)));
+        assert_eq!(
+            (each[1].trust.implausible, each[2].trust.implausible),
+            (0.0, 1.0)
+        );
     }
 }

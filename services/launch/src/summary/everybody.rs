@@ -37,7 +37,7 @@ fn table(people: &People) -> String {
             person.frames,
             person.first_frame,
             person.last_frame,
-            verdict(person)
+            verdict(person, people.followed.contains(&person.id))
         );
     }
     if n_left_out > 0 {
@@ -49,8 +49,12 @@ fn table(people: &People) -> String {
     text
 }
 
-fn verdict(person: &PersonSummary) -> String {
-    let doubts = person.trust.doubts();
+fn verdict(person: &PersonSummary, is_followed: bool) -> String {
+    let doubts = if is_followed {
+        person.trust.doubts()
+    } else {
+        person.trust.doubts_of_another()
+    };
     if !doubts.is_empty() {
         let doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
         return format!("may be wrong: {}", doubts.join("; "));
