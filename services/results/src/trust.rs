@@ -1,6 +1,6 @@
 //! Judges how far the results can be trusted, from the results for the followed person, frame by frame.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use messages::{Sides, SkeletonMessage, Status};
 use nalgebra::Vector3;
@@ -17,6 +17,12 @@ const LONGEST_M: f64 = 1.0;
 const FARTHEST_M: f64 = 0.5;
 /// Speed up to which a larger movement between two results is accepted, in metres per second.
 const FASTEST_M_S: f64 = 6.0;
+/// Distance by which a joint must leave its path to count as jumping, in metres, and the acceleration that no limb reaches, in metres per
+/// second squared: a pitcher's wrist reaches about 500.
+const OFF_PATH_M: f64 = 0.15;
+const FASTEST_M_S2: f64 = 500.0;
+/// Maximum time from the first to the last of the three results with which a path is judged, in seconds.
+const PATH_S: f64 = 0.2;
 /// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
 const SD_PER_MAD: f64 = 1.4826;
 
@@ -24,6 +30,13 @@ const SD_PER_MAD: f64 = 1.4826;
 const STEP: f64 = 0.05;
 /// Width of a bin of the histogram of reprojection errors, as a fraction of the person's height.
 const ERROR_STEP: f64 = 0.001;
+
+/// The joints at the time of a result.
+#[derive(Debug)]
+struct Instant {
+    time_s: f64,
+    joints: Vec<Option<Vector3<f64>>>,
+}
 
 /// Collects evidence for and against the results.
 #[derive(Debug, Default)]
@@ -45,6 +58,9 @@ pub(crate) struct Trusted {
     /// Time of the last result in seconds, and position of its body.
     last: Option<(f64, Vector3<f64>)>,
     n_jumps: u64,
+    /// The last two results: time in seconds, and positions of the joints.
+    path: VecDeque<Instant>,
+    n_limb_jumps: u64,
     warned: Vec<Doubt>,
 }
 
@@ -137,12 +153,36 @@ impl Trusted {
         let Some(now_s) = time_s.filter(|_| n > 0) else {
             return;
         };
+        self.limbs_moved(pose, now_s);
         let middle = sum / f64::from(n);
         if let Some((before_s, before)) = self.last {
             let farthest = FARTHEST_M.max(FASTEST_M_S * (now_s - before_s));
             self.n_jumps += u64::from((middle - before).norm() > farthest);
         }
         self.last = Some((now_s, middle));
+    }
+
+    /// Counts a result if a joint of the result before it is off the path between its neighbours.
+    fn limbs_moved(&mut self, pose: &SkeletonMessage, time_s: f64) {
+        let joints = (0..pose.n_joints as usize).map(|joint| place(pose, joint)).collect();
+        let now = Instant { time_s, joints };
+        if let [first, middle] = self.path.make_contiguous()
+            && (f64::EPSILON..PATH_S).contains(&(time_s - first.time_s))
+        {
+            let share = (middle.time_s - first.time_s) / (time_s - first.time_s);
+            let least_s2 = (middle.time_s - first.time_s) * (time_s - middle.time_s) / 2.0;
+            let limit_m = OFF_PATH_M.max(FASTEST_M_S2 * least_s2);
+            let joints = first.joints.iter().zip(&middle.joints).zip(&now.joints);
+            let is_off = joints.filter_map(|((first, middle), last)| {
+                let between = first.as_ref()?.lerp(last.as_ref()?, share);
+                Some((middle.as_ref()? - between).norm() > limit_m)
+            });
+            self.n_limb_jumps += u64::from(is_off.into_iter().any(|is_off| is_off));
+        }
+        self.path.push_back(now);
+        while self.path.len() > 2 {
+            self.path.pop_front();
+        }
     }
 
     /// Returns the scatter (standard deviation) of the bone lengths, in metres.
@@ -162,6 +202,7 @@ impl Trusted {
                 .then(|| self.distances.0 / self.distances.1 as f64),
             frames: self.frames,
             jumps: share(self.n_jumps, self.frames),
+            limb_jumps: share(self.n_limb_jumps, self.frames),
             implausible: share(self.n_implausible, self.frames),
             joints_implausible: share(self.n_joints_implausible, self.n_joints),
             reprojection: median(&self.errors).map(|median| f64::from(median) * ERROR_STEP),
@@ -300,5 +341,26 @@ mod tests {
         let scatter = got.bone_scatter_m.unwrap();
         assert!((0.01..0.03).contains(&scatter), "{scatter}");
         assert!((got.disagreement_m.unwrap() - 0.03).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_joint_that_jumps_out_of_its_path_is_counted_and_a_fast_one_is_not() {
+        let limb_jumps = |off_m: f64, rate_hz: f64| {
+            let mut trusted = Trusted::default();
+            for nth in 0..20 {
+                let mut pose = result(Sides::SURE);
+                let off_m = if nth == 10 { off_m } else { 0.0 };
+                // 20 m/s, like the wrist of a pitcher.
+                let time_s = f64::from(nth) / rate_hz;
+                pose.joints[0].in_world = [20.0 * time_s, off_m, 0.0];
+                trusted.add(Some(&pose), &[(0, 1)], (Some(time_s), &[]));
+            }
+            trusted.trust().limb_jumps
+        };
+        assert_eq!(limb_jumps(0.0, 60.0), 0.0);
+        assert_eq!(limb_jumps(0.2, 60.0), 0.05);
+        // At a lower rate, a limb can do that. The neighbours of a joint that is farther off are off their paths, too.
+        assert_eq!(limb_jumps(0.2, 25.0), 0.0);
+        assert_eq!(limb_jumps(0.9, 25.0), 0.15);
     }
 }

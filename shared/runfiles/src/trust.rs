@@ -33,6 +33,8 @@ pub struct Trust {
     /// Fraction of the results in which the middle of the body is farther from the middle in the previous result than a person can have
     /// moved.
     pub jumps: f64,
+    /// Fraction of the results in which a joint leaves its path by more than 0.15 m, faster than any limb can move.
+    pub limb_jumps: f64,
     /// Distance of the joints' reprojections from the views' observations, as a fraction of the person's height in the frames: median
     /// over all joints, so that joints that other people or things hide have little effect.
     #[serde(deserialize_with = "nullable")]
@@ -57,17 +59,19 @@ enum Kind {
     Joints,
     Bones,
     Jumps,
+    LimbJumps,
     Sides,
 }
 
 impl Kind {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Reprojection,
         Self::Limbs,
         Self::Implausible,
         Self::Joints,
         Self::Bones,
         Self::Jumps,
+        Self::LimbJumps,
         Self::Sides,
     ];
 
@@ -79,6 +83,7 @@ impl Kind {
             Self::Reprojection => 0.07,
             Self::Limbs | Self::Jumps => 0.02,
             Self::Implausible | Self::Joints => 0.15,
+            Self::LimbJumps => 0.1,
             Self::Bones => 2.0,
             Self::Sides => 0.3,
         }
@@ -98,6 +103,7 @@ impl Kind {
             Self::Reprojection => trust.reprojection,
             Self::Limbs => trust.expected_error_m(),
             Self::Jumps => Some(trust.jumps),
+            Self::LimbJumps => Some(trust.limb_jumps),
             Self::Implausible => Some(trust.implausible),
             Self::Joints => Some(trust.joints_implausible),
             Self::Bones => trust.body_deviation,
@@ -200,6 +206,11 @@ impl fmt::Display for Doubt {
                 "the person jumps in {value:.1} % of the results (limit {limit:.0} %), because two people are taken for one: change \
                  `person.follow`, or limit the space that the cameras see"
             ),
+            Kind::LimbJumps => write!(
+                f,
+                "a joint jumps out of its path in {value:.0} % of the results (limit {limit:.0} %), faster than any limb moves: limbs are \
+                 hidden or taken for others, or frames of a camera are out of order"
+            ),
             Kind::Implausible => write!(
                 f,
                 "{value:.0} % of the detected bodies are impossible (limit {limit:.0} %): is one person completely visible, and is the \
@@ -238,6 +249,7 @@ mod tests {
             disagreement_m: Some(0.04),
             frames: 100,
             jumps: 0.0,
+            limb_jumps: 0.07,
             implausible: 0.01,
             joints_implausible: 0.02,
             reprojection: Some(0.02),
@@ -248,13 +260,14 @@ mod tests {
     #[test]
     fn good_results_raise_no_doubt_and_each_limit_raises_one() {
         assert_eq!(good().doubts(), []);
-        let cases: [(Spoil, &str); 7] = [
+        let cases: [(Spoil, &str); 8] = [
             (|trust| trust.reprojection = Some(0.2), "joints are 20 %"),
             (
                 |trust| trust.bone_scatter_m = Some(0.0163),
                 "by 2.6 cm in total",
             ),
             (|trust| trust.jumps = 0.087, "jumps in 8.7 %"),
+            (|trust| trust.limb_jumps = 0.2, "out of its path in 20 % of"),
             (
                 |trust| trust.implausible = 0.4,
                 "40 % of the detected bodies",
