@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use runfiles::{FrameLine, RunSummary, SmoothReport};
 
+/// End of the temporary name of a file.
+const PART: &str = ".part";
 /// File that marks a folder of pictures as written by a run.
 const MARK: &str = ".parallax";
 
@@ -53,11 +55,26 @@ impl Folder {
         })
     }
 
-    /// Returns true if a run has finished all its files in the folder, under their final names.
+    /// Returns true if a run has finished all its files in the folder, under their final names. If a killed process had written all files,
+    /// but had not renamed all of them, they are renamed.
     pub fn is_finished(dir: &Path, session: u64) -> bool {
-        let text =
-            files::read_text(&dir.join(RunSummary::FILE), files::SETTINGS).unwrap_or_default();
-        RunSummary::parse_session(&text) == Ok(session)
+        let read = |name: &str| {
+            let text = files::read_text(&dir.join(name), files::SETTINGS).unwrap_or_default();
+            RunSummary::parse(&text).ok().filter(|summary| summary.session == session)
+        };
+        if read(RunSummary::FILE).is_some() {
+            return true;
+        }
+        // Files that lack lines keep their temporary names, so a run with such files starts to write again.
+        let is_written =
+            read(&part(RunSummary::FILE)).is_some_and(|whole| whole.summary.writes_failed == 0);
+        let Some(mut folder) = Self::open(dir, true).ok().filter(|_| is_written) else {
+            return false;
+        };
+        let entries = fs::read_dir(dir).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        folder.parts = names.filter_map(|name| Some(name.strip_suffix(PART)?.to_owned())).collect();
+        folder.finish().is_empty()
     }
 
     /// Starts a file.
@@ -178,12 +195,12 @@ impl Folder {
         }
     }
 
-    /// Gives every file its final name, in alphabetical order: `summary.json` comes after the files that it mentions.
+    /// Gives every file its final name; `summary.json` comes last, after the files that it mentions.
     ///
     /// Returns the errors. All other files still get their final names.
     pub fn finish(&self) -> Vec<FolderError> {
         let mut names = self.parts.clone();
-        names.sort();
+        names.sort_by_key(|name| (name == RunSummary::FILE, name.clone()));
         let outcomes = names.iter().map(|name| {
             let (from, to) = (self.part(name), self.dir.path().join(name));
             // Renaming a folder does not replace another folder, so the other folder is removed first.
@@ -199,7 +216,7 @@ impl Folder {
 
 /// Returns the temporary name of a file.
 fn part(name: &str) -> String {
-    format!("{name}.part")
+    format!("{name}{PART}")
 }
 
 /// Removes an incomplete last line that a killed process left.
@@ -349,13 +366,44 @@ mod tests {
         folder.reserve("summary.json", 100).unwrap();
         let part = dir.path().join("summary.json.part");
         assert_eq!(fs::metadata(&part).unwrap().len(), 100);
-        folder.fill("summary.json", "{ \"session\": 5 }\n").unwrap();
-        assert!(!Folder::is_finished(dir.path(), 5));
+        folder.fill("summary.json", "short\n").unwrap();
         assert!(folder.finish().is_empty());
         let text = fs::read_to_string(dir.path().join("summary.json")).unwrap();
-        assert_eq!(text, "{ \"session\": 5 }\n");
-        assert!(Folder::is_finished(dir.path(), 5));
+        assert_eq!(text, "short\n");
+    }
+
+    #[test]
+    fn a_process_killed_while_it_renames_its_files_has_finished() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let mut summary = RunSummary {
+            frame_rate_hz: None,
+            joints: String::new(),
+            latency: runfiles::LatencyReport::default(),
+            schema_version: runfiles::VERSION,
+            session: 5,
+            summary: runfiles::Summary::default(),
+            trc_axes: String::new(),
+            views: Vec::new(),
+        };
+        let write = |summary: &RunSummary| {
+            fs::write(path("summary.json.part"), summary.to_text().unwrap()).unwrap();
+        };
+        fs::write(path("pose3d.jsonl"), "renamed").unwrap();
+        fs::write(path("times.jsonl.part"), "not yet").unwrap();
+        assert!(!Folder::is_finished(dir.path(), 5), "no summary");
+        summary.summary.writes_failed = 1;
+        write(&summary);
+        assert!(!Folder::is_finished(dir.path(), 5), "lines are missing");
+        summary.summary.writes_failed = 0;
+        write(&summary);
         assert!(!Folder::is_finished(dir.path(), 6), "another run");
+        assert!(Folder::is_finished(dir.path(), 5));
+        for (name, text) in [("pose3d.jsonl", "renamed"), ("times.jsonl", "not yet")] {
+            assert_eq!(fs::read_to_string(path(name)).unwrap(), text);
+        }
+        assert!(Folder::is_finished(dir.path(), 5), "once more");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
     }
 
     #[test]

@@ -215,11 +215,6 @@ impl Output {
         self.tally.missed(n);
     }
 
-    /// Returns the scene that gives messages their meaning.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// Returns the summary so far.
     pub fn summary(&self) -> Summary {
         self.tally.summary()
@@ -271,11 +266,12 @@ impl Output {
 
     /// Writes the head of `pose3d.trc`. It contains the number of rows, so it is written last.
     fn head_trc(&self) -> io::Result<()> {
-        let rows = files::read_text(&self.folder.part(TRC), files::RESULTS)?;
+        let text = files::read_text(&self.folder.part(TRC), files::RESULTS)?;
+        let rows = trc::rows(&text);
         let n_rows = rows.lines().count() as u64;
         // Without a rate there are no rows, so the value does not matter.
         let rate_hz = self.scene.frame_rate_hz.unwrap_or_default();
-        let text = trc::header(&self.scene, rate_hz, n_rows) + &rows;
+        let text = trc::header(&self.scene, rate_hz, n_rows) + rows;
         self.folder.rewrite(TRC, &text)
     }
 

@@ -23,6 +23,14 @@ pub(crate) fn row(scene: &Scene, row: u64, frame: &Skeletons) -> String {
     formats::trc::row(row, time, points)
 }
 
+/// Returns the rows of a file without the five lines before them, which a killed process may have written.
+pub(crate) fn rows(text: &str) -> &str {
+    let is_headed = text.starts_with("PathFileType");
+    let ends = text.match_indices('\n').map(|(at, _)| at + 1);
+    let begin = if is_headed { ends.take(5).last() } else { None };
+    &text[begin.unwrap_or(0)..]
+}
+
 /// Returns the five lines before the rows.
 ///
 /// * `rate_hz`: frames of the footage per second.
@@ -57,6 +65,15 @@ mod tests {
             text.push_str(&row(&scene, index as u64 + 1, &pose));
         }
         Trc::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn the_rows_are_found_with_and_without_a_head() {
+        let scene = scene();
+        let rows_of = row(&scene, 1, &skeletons(0)) + &row(&scene, 2, &skeletons(1));
+        assert_eq!(rows(&rows_of), rows_of);
+        assert_eq!(rows(&(header(&scene, 60.0, 2) + &rows_of)), rows_of);
+        assert_eq!(rows(&header(&scene, 60.0, 0)), "");
     }
 
     #[test]
