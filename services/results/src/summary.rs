@@ -1,6 +1,8 @@
 //! Counts of results and losses over the whole run.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use messages::Status;
@@ -57,9 +59,12 @@ impl Tally {
     /// Restores the counts of a killed process by reading `pose3d.jsonl` again. A missing file and broken lines are ignored.
     pub(crate) fn resume(scene: &Scene, file: &Path) -> Self {
         let mut tally = Self::new(scene);
-        let text = files::read_text(file, files::RESULTS).unwrap_or_default();
-        for line in runfiles::lines(&text).flatten() {
-            tally.line(scene, &line);
+        // Line by line, because the file of a long run is large.
+        let lines = File::open(file).into_iter().flat_map(|file| BufReader::new(file).split(b'\n'));
+        for text in lines.map_while(Result::ok) {
+            for line in runfiles::lines(&String::from_utf8_lossy(&text)).flatten() {
+                tally.line(scene, &line);
+            }
         }
         tally
     }
