@@ -148,6 +148,7 @@ impl Feed {
                 tag: source.info().tag,
                 depth: source.info().depth,
                 is_interlaced: source.info().is_interlaced,
+                uneven_s: source.info().uneven_s,
             },
             Self::Scene(stage) => stage.info,
             Self::Blank(feed) => feed.info,

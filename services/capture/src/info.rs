@@ -19,6 +19,8 @@ pub struct FeedInfo {
     pub depth: Option<Depth>,
     /// True if the pictures are interlaced: every picture consists of two pictures from different moments, line by line.
     pub is_interlaced: bool,
+    /// Largest difference of a picture's time from equally spaced times, in seconds, if a video is not evenly spaced.
+    pub uneven_s: Option<f64>,
 }
 
 impl FeedInfo {
@@ -32,6 +34,7 @@ impl FeedInfo {
             tag: Turn::default(),
             depth: None,
             is_interlaced: false,
+            uneven_s: None,
         }
     }
 }

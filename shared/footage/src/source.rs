@@ -62,6 +62,8 @@ pub struct SourceInfo {
     pub depth: Option<Depth>,
     /// True if a video is interlaced: the lines of every picture alternate between two different moments.
     pub is_interlaced: bool,
+    /// Largest difference of a frame's time from equally spaced times, in seconds, if a video is not evenly spaced.
+    pub uneven_s: Option<f64>,
 }
 
 /// One frame of footage.
@@ -274,6 +276,10 @@ impl Reader {
                 Self::Video(_) => None,
             },
             is_interlaced: matches!(self, Self::Video(video) if video.probe.is_interlaced),
+            uneven_s: match self {
+                Self::Still(_) | Self::Images(_) => None,
+                Self::Video(video) => video.probe.uneven_s,
+            },
         }
     }
 }

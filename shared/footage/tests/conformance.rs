@@ -185,6 +185,8 @@ fn frames_of_an_irregular_video_keep_their_own_times() {
         let path = clip::encode(folder.path(), name, &options);
         let mut source = Source::open(&SourceSpec::new(path.to_str().unwrap())).unwrap();
         assert_eq!(source.info().n_frames, 6);
+        let uneven_s = source.info().uneven_s.unwrap();
+        assert!((uneven_s - 0.4).abs() < 2e-3, "{uneven_s}");
         for expect in [0.0, 0.04, 0.08, 1.12, 1.16, 1.2] {
             let time_s = source.next_frame().unwrap().unwrap().time_s.unwrap();
             assert!((time_s - expect).abs() < 2e-3, "{time_s} for {expect}");

@@ -27,6 +27,8 @@ pub(super) struct Probe {
     pub(super) n_promised: u64,
     /// Presentation times, in seconds after the first frame, if frames are not equally spaced.
     pub(super) times_s: Option<Vec<f64>>,
+    /// Largest difference of a frame's time from equally spaced times, in seconds; `None` if it is below [`UNEVEN`].
+    pub(super) uneven_s: Option<f64>,
     /// Time of the first frame in the decoder, in seconds; `None` if it is known only after the first frame has been decoded.
     pub(super) origin_s: Option<f64>,
     /// True if pictures can depend on other pictures.
@@ -49,6 +51,10 @@ const ODD_RATE: &str = "225/32";
 const INTRA: [&str; 9] = [
     "mjpeg", "png", "bmp", "gif", "rawvideo", "ffv1", "huffyuv", "prores", "dnxhd",
 ];
+
+/// Smallest difference of a frame's time from equally spaced times that is reported, as a fraction of the interval. One dropped frame causes
+/// half an interval.
+const UNEVEN: f64 = 0.4;
 
 /// Probes the video stream of `path`.
 ///
@@ -87,6 +93,7 @@ pub(super) fn probe(path: &Path, spec: &SourceSpec) -> Result<Probe, FootageErro
         n_frames: number(&stream["nb_frames"]).map_or(0, |value| value as u64),
         n_promised: 0,
         times_s: None,
+        uneven_s: None,
         origin_s: origin(stream, &output["format"], codec),
         is_inter: !INTRA.contains(&codec),
         is_interlaced: ["tt", "bb", "tb", "bt"].iter().any(|name| stream["field_order"] == *name),
@@ -198,6 +205,7 @@ impl Probe {
         for time_s in &mut times_s {
             *time_s -= first_s;
         }
+        self.uneven_s = uneven_s(&times_s);
         self.times_s = (!self.is_regular(&times_s)).then_some(times_s);
     }
 
@@ -233,6 +241,15 @@ impl Probe {
             times_s.iter().enumerate().map(late).all(|value| value < 0.25)
         })
     }
+}
+
+/// Returns the largest difference of the times from equally spaced times between the first and the last; `None` if it is below [`UNEVEN`].
+fn uneven_s(times_s: &[f64]) -> Option<f64> {
+    let (first, last) = (times_s.first()?, times_s.last()?);
+    let interval_s = (last - first) / (times_s.len() - 1).max(1) as f64;
+    let off_s = times_s.iter().enumerate();
+    let off_s = off_s.map(|(nth, time_s)| (time_s - first - nth as f64 * interval_s).abs());
+    off_s.reduce(f64::max).filter(|off_s| *off_s > UNEVEN * interval_s)
 }
 
 /// Returns the frames that can be decoded without any other frame, from the packets of a stream.
@@ -302,6 +319,20 @@ mod tests {
             ("", true),
         ] {
             assert_eq!(is_5_1(version), expect, "{version}");
+        }
+    }
+
+    #[test]
+    fn a_dropped_frame_makes_times_uneven_and_jitter_does_not() {
+        let jitter = |nth: u32| 0.004 * f64::from(nth * 7 % 3);
+        let regular: Vec<f64> = (0..100).map(|nth| f64::from(nth) / 30.0 + jitter(nth)).collect();
+        assert_eq!(uneven_s(&regular), None);
+        let mut dropped: Vec<f64> = (0..100).map(|nth| f64::from(nth) / 30.0).collect();
+        dropped.remove(50);
+        let off_s = uneven_s(&dropped).unwrap();
+        assert!((0.016..0.018).contains(&off_s), "{off_s}");
+        for few in [&[][..], &[0.0], &[0.0, 0.4]] {
+            assert_eq!(uneven_s(few), None);
         }
     }
 

@@ -393,6 +393,7 @@ mod tests {
             n_frames: 100,
             n_promised: 100,
             times_s,
+            uneven_s: None,
             origin_s: None,
             is_inter: false,
             is_interlaced: false,
