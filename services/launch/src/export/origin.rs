@@ -103,9 +103,8 @@ impl Origin {
                 TrialError::Joints(_) | TrialError::Range { .. } => ExitKind::Input,
             };
             // A part of the run may be missing.
-            let why = flaws.iter().map(|flaw| format!("\n  {flaw}")).collect::<String>();
-            let message = format!("{}: {error}; nothing was written{why}", source.display());
-            Failure::new(kind, message)
+            let message = format!("{}: {error}; nothing was written", source.display());
+            Failure::new(kind, [&[message], &flaws[..]].concat().join("\n  "))
         })?;
         // All trials have the same frames and times.
         check_rate(&trials[0], given)?;
