@@ -150,6 +150,11 @@ impl Gather {
         Some(Settled { absent, record })
     }
 
+    /// Returns the first frame after the last result.
+    pub(crate) fn next(&self) -> u64 {
+        self.next
+    }
+
     /// Returns the frames after the last result when the stream has ended, up to the end of the longest footage.
     pub(crate) fn rest(&mut self) -> Vec<Absent> {
         let end = self.histories.iter().filter_map(ViewHistory::end).max();

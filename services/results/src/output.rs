@@ -135,7 +135,7 @@ impl Output {
     }
 
     /// Writes lines for frames that were left out because the disk was too slow.
-    fn fill_up_to(&mut self, frame: u64) {
+    pub(crate) fn fill_up_to(&mut self, frame: u64) {
         let begin = self.next_frame().unwrap_or(frame);
         for frame in (begin..frame).step_by(self.scene.frame_step.max(1) as usize) {
             self.without(&Absent {

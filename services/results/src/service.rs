@@ -55,7 +55,7 @@ pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
                 may_await = begin.elapsed() < AWAITED;
             }
             if skeletons.status == Status::END {
-                writer.rest(gather.rest());
+                writer.rest(gather.next(), gather.rest());
                 is_over = true;
                 break;
             }

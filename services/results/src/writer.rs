@@ -18,6 +18,8 @@ const QUEUE: usize = 256;
 
 /// Records to be written: frames without a result, then a frame with a result.
 struct Batch {
+    /// First frame that no batch before the end of the run contained. Results before it may have been dropped.
+    next: Option<u64>,
     absent: Vec<Absent>,
     record: Option<FrameRecord>,
 }
@@ -84,8 +86,12 @@ impl Writer {
 
     /// Queues a record. Returns `false` if it was dropped because the queue is full.
     pub(crate) fn write(&self, Settled { absent, record }: Settled) -> bool {
-        let record = Some(record);
-        match self.queue.try_send(Batch { absent, record }) {
+        let batch = Batch {
+            next: None,
+            absent,
+            record: Some(record),
+        };
+        match self.queue.try_send(batch) {
             Ok(()) => {
                 self.n_queued.set(self.n_queued.get() + 1);
                 true
@@ -98,9 +104,15 @@ impl Writer {
     }
 
     /// Queues the frames without a result after the last result. Waits for space, because nothing follows.
-    pub(crate) fn rest(&self, absent: Vec<Absent>) {
-        let record = None;
-        if let Err(error) = self.queue.send(Batch { absent, record }) {
+    ///
+    /// * `next`: first frame after the last result.
+    pub(crate) fn rest(&self, next: u64, absent: Vec<Absent>) {
+        let batch = Batch {
+            next: Some(next),
+            absent,
+            record: None,
+        };
+        if let Err(error) = self.queue.send(batch) {
             tracing::debug!(%error, "the writing thread has ended");
         }
     }
@@ -124,9 +136,12 @@ fn write_all(
     [n_missed, n_written]: [&AtomicU64; 2],
     session: u64,
 ) {
-    while let Ok(Batch { absent, record }) = batches.recv() {
-        output.absent(&absent);
-        let Some(record) = record else { continue };
+    while let Ok(batch) = batches.recv() {
+        if let Some(next) = batch.next {
+            output.fill_up_to(next);
+        }
+        output.absent(&batch.absent);
+        let Some(record) = batch.record else { continue };
         output.frame(&record);
         n_written.fetch_add(1, Ordering::Relaxed);
     }

@@ -142,8 +142,10 @@ fn every_frame_is_in_all_result_files() {
     output.absent(&[absent(6)]);
     output.frame(&record(8));
     output.absent(&[absent(10)]);
+    // Frame 12, the last one, was not taken either.
+    output.fill_up_to(14);
     let summary = output.finish(1);
-    assert_eq!((summary.frames, summary.frames_missed), (2, 4));
+    assert_eq!((summary.frames, summary.frames_missed), (2, 5));
     let lines = text(&dir, "pose3d.jsonl");
     let lines = lines.lines().map(|line| serde_json::from_str(line).unwrap());
     let lines: Vec<Value> = lines.collect();
@@ -154,22 +156,24 @@ fn every_frame_is_in_all_result_files() {
         )
     };
     let dropped = Some("dropped".to_owned());
+    let not_written = Some("its result could not be written".to_owned());
     let expected = [
         (Some(0), dropped.clone()),
         (Some(2), None),
-        (Some(4), Some("its result could not be written".to_owned())),
+        (Some(4), not_written.clone()),
         (Some(6), dropped.clone()),
         (Some(8), None),
         (Some(10), dropped),
+        (Some(12), not_written),
     ];
     assert_eq!(lines.iter().map(told).collect::<Vec<_>>(), expected);
     assert_eq!(
         lines[0]["views_missing"],
         json!({ "left": "dropped", "right": "dropped" })
     );
-    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 6 * 14);
+    assert_eq!(text(&dir, "pose3d.csv").lines().count(), 1 + 7 * 14);
     let trc = formats::trc::Trc::parse(&text(&dir, "pose3d.trc")).unwrap();
-    assert_eq!(trc.frames.len(), 6);
+    assert_eq!(trc.frames.len(), 7);
 }
 
 #[test]
