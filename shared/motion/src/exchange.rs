@@ -25,8 +25,12 @@ pub(crate) fn settle(
         .filter_map(|(a, b)| b.filter(|b| a < *b).map(|b| [a, b]))
         .collect();
     let mut is_changed = vec![false; tracks.len()];
-    let mut counts = [0; 3];
     let is_some_sure = recorded.is_some_sure();
+    let mut counts = if is_some_sure {
+        [0; 3]
+    } else {
+        recorded.unsure()
+    };
     for at in 0..recorded.times.len() {
         if is_some_sure && recorded.sides[at] == Sides::Unsure {
             counts[unsure(recorded, &pairs, tracks, at, &mut is_changed)] += 1;

@@ -167,7 +167,7 @@ fn doubts(cut: Option<&str>, report: &SmoothReport) -> Vec<String> {
         doubts.push(NOTHING_MEASURED.to_owned());
     }
     for person in measured {
-        let own = doubts_of(person, report.n_frames as usize).into_iter();
+        let own = doubts_of(person).into_iter();
         if report.people.len() == 1 {
             doubts.extend(own);
         } else {
@@ -182,7 +182,7 @@ fn n_measured(person: &SmoothedPerson) -> usize {
     person.joints.values().map(|joint| joint.measured + joint.exchanged).sum()
 }
 
-fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
+fn doubts_of(person: &SmoothedPerson) -> Vec<String> {
     let mut doubts = Vec::new();
     let n_measured = n_measured(person);
     let n_rejected: usize = person.joints.values().map(|joint| joint.rejected).sum();
@@ -192,16 +192,25 @@ fn doubts_of(person: &SmoothedPerson, n_frames: usize) -> Vec<String> {
              measurements first"
         ));
     }
-    let n_unsure = person.unsure.kept + person.unsure.exchanged + person.unsure.left_out;
-    if n_unsure > 0 && n_unsure == n_frames {
+    // Joints without a side are used in every frame with the person.
+    let used = person
+        .joints
+        .values()
+        .map(|joint| joint.measured + joint.exchanged + joint.rejected);
+    let n_frames = used.max().unwrap_or(0).max(person.unsure.left_out);
+    let Unsure {
+        kept,
+        exchanged,
+        left_out,
+    } = person.unsure;
+    if kept > 0 && kept >= n_frames && exchanged + left_out == 0 {
         doubts.push(
             "left and right are uncertain in every frame, so both sides were kept as measured"
                 .to_owned(),
         );
-    } else if person.unsure.left_out * 5 > n_frames {
+    } else if left_out * 5 > n_frames {
         doubts.push(format!(
-            "left and right are uncertain in {} of {n_frames} frames, and the frames before and after do not help to distinguish them",
-            person.unsure.left_out
+            "left and right are uncertain in {left_out} of {n_frames} frames, and the frames before and after do not help to distinguish them"
         ));
     }
     doubts
@@ -259,5 +268,29 @@ mod tests {
             one.len() == 1 && one[0].starts_with("person [3]: 4 measurements"),
             "{one:?}"
         );
+    }
+
+    #[test]
+    fn uncertain_sides_are_compared_with_the_frames_in_which_the_person_is_there() {
+        let doubts = |[kept, exchanged, left_out]: [usize; 3]| {
+            let neck = SmoothedJoint {
+                measured: 10,
+                ..SmoothedJoint::default()
+            };
+            doubts_of(&SmoothedPerson {
+                joints: [("neck".to_owned(), neck)].into(),
+                unsure: Unsure {
+                    exchanged,
+                    kept,
+                    left_out,
+                },
+                ..SmoothedPerson::default()
+            })
+        };
+        assert_eq!(doubts([9, 1, 0]), Vec::<String>::new());
+        assert_eq!(doubts([2, 6, 2]), Vec::<String>::new());
+        assert!(doubts([10, 0, 0])[0].contains("kept as measured"));
+        assert!(doubts([0, 0, 3])[0].contains("uncertain in 3 of 10 frames"));
+        assert!(doubts([0, 0, 10])[0].contains("uncertain in 10 of 10 frames"));
     }
 }

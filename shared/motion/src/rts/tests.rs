@@ -174,6 +174,7 @@ fn without_certain_sides_no_measurement_is_rejected() {
     }
     let got = crate::smooth(&recorded, &Settings::default());
     assert!(got.joints[0][3..].iter().all(Result::is_ok));
+    assert_eq!(got.report.unsure, [recorded.times.len() - 3, 0, 0]);
 }
 
 #[test]
