@@ -16,6 +16,9 @@ const MORE: f64 = 1.01;
 /// Minimum share of the budget that is kept.
 const LEAST_KEPT: f64 = 0.1;
 
+/// Number of frames after which the usual difference between their numbers is determined anew.
+const MANY: u64 = 100;
+
 /// Number of runs of the network that a view can afford per frame at the frame rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LookBudget {
@@ -23,6 +26,9 @@ pub struct LookBudget {
     interval_s: f64,
     /// Difference between the numbers of frames if none is dropped.
     frame_step: u64,
+    /// Usual difference; larger than `frame_step` if the camera delivers fewer frames than it states, for example in the dark.
+    usual_step: u64,
+    recent: Recent,
     /// Processor time per frame, in seconds, if the view keeps up.
     most_s: f64,
     /// Fraction of `most_s` that is used. It decreases while the view is too slow, because other programs may need the cores.
@@ -31,6 +37,16 @@ pub struct LookBudget {
     cost_s: Option<f64>,
     /// Mean duration of a frame, as a fraction of the interval.
     load: f64,
+}
+
+/// The frames since the usual difference between their numbers was determined.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Recent {
+    n: u64,
+    /// Number of frames with little more than the minimum budget.
+    n_low: u64,
+    /// Sum of the differences between the numbers of frames.
+    steps: u64,
 }
 
 /// Runs of the network in a frame, and the times that the frame took.
@@ -52,9 +68,12 @@ impl LookBudget {
     /// * `cores_per_view`: number of cores divided by the number of views that they process.
     /// * `interval_s`: time between frames, in seconds; `frame_step`: difference between their numbers if none is dropped.
     pub fn new(cores_per_view: f64, interval_s: f64, frame_step: u64) -> Self {
+        let frame_step = frame_step.max(1);
         Self {
             interval_s,
             frame_step,
+            usual_step: frame_step,
+            recent: Recent::default(),
             most_s: SHARE * cores_per_view * interval_s,
             kept: 1.0,
             cost_s: None,
@@ -70,7 +89,8 @@ impl LookBudget {
     /// Takes note of the times that a frame took.
     pub fn spent(&mut self, spent: &Spent) {
         self.load += NEW_LOAD * (spent.clock_s / self.interval_s - self.load);
-        let factor = if spent.n_frames > self.frame_step {
+        self.learn_step(spent.n_frames);
+        let factor = if spent.n_frames > self.usual_step {
             AFTER_DROPPED
         } else if self.load > MOST_LOAD {
             LESS
@@ -82,6 +102,27 @@ impl LookBudget {
             let new = spent.processor_s / spent.n_looks;
             self.cost_s = Some(self.cost_s.map_or(new, |cost| cost + NEW_COST * (new - cost)));
         }
+    }
+}
+
+impl LookBudget {
+    /// Learns the usual difference between the numbers of frames. If frames are missing however few runs there are, they were not dropped
+    /// for want of time.
+    fn learn_step(&mut self, n_frames: u64) {
+        let recent = &mut self.recent;
+        recent.n += 1;
+        recent.n_low += u64::from(self.kept <= 2.0 * LEAST_KEPT);
+        recent.steps += n_frames;
+        if recent.n < MANY {
+            return;
+        }
+        let mean = recent.steps.div_ceil(recent.n * self.frame_step).max(1) * self.frame_step;
+        self.usual_step = if recent.n_low == recent.n {
+            mean
+        } else {
+            mean.min(self.usual_step)
+        };
+        *recent = Recent::default();
     }
 }
 
@@ -141,5 +182,28 @@ mod tests {
         assert!(after < 0.6 * at_first && after > 0.0, "{after}");
         (0..200).for_each(|_| budget.spent(&fast));
         assert_eq!(budget.looks(), Some(at_first));
+    }
+
+    #[test]
+    fn a_camera_that_delivers_fewer_frames_than_it_states_is_not_taken_for_a_slow_machine() {
+        // The differences of a camera with half, and of one with two thirds of its stated rate.
+        for steps in [[4, 4], [2, 4]] {
+            let mut budget = LookBudget::new(1.0, 0.05, 2);
+            let mut run = |n: usize, steps: [u64; 2]| {
+                for n_frames in steps.into_iter().cycle().take(n) {
+                    budget.spent(&Spent {
+                        n_frames,
+                        ..frame(1.0, 0.01, 0.02)
+                    });
+                }
+                budget.looks().unwrap()
+            };
+            let at_first = run(1, [2, 2]);
+            assert!(run(99, steps) < 0.2 * at_first);
+            assert_eq!(run(500, steps), at_first, "{steps:?}");
+            // In the light, it has its rate again, and then a larger difference is a dropped frame.
+            run(200, [2, 2]);
+            assert!(run(6, [4, 4]) < 0.6 * at_first);
+        }
     }
 }
