@@ -461,18 +461,13 @@ impl Supervisor<'_> {
     ///
     /// * `waited`: time since the stop request.
     fn release(&mut self, index: usize, waited: Duration) {
-        let policy = &self.plan.policy;
         let watch = &mut self.watches[index];
+        let grace = watch.grace(&self.plan.policy, Instant::now());
         let Phase::Running(child) = &mut watch.phase else {
             return;
         };
         if matches!(child.try_wait(), Ok(None)) {
-            let limit = if watch.spec.completes_files {
-                policy.grace.max(policy.hang_limit)
-            } else {
-                policy.grace
-            };
-            if waited < limit {
+            if waited < grace {
                 return;
             }
             (self.on_event)(Event::Killed {

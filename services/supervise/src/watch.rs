@@ -344,6 +344,17 @@ impl Watch {
             && self.current.is_none_or(|health| health.n_waiting == 0)
     }
 
+    /// Returns the time that the process has to end after the stop request. A process that completes files has more time, as long as it sends
+    /// heartbeats.
+    pub(crate) fn grace(&self, policy: &Policy, now: Instant) -> Duration {
+        let silent = now.saturating_duration_since(self.heartbeat.at);
+        if self.spec.completes_files && silent <= policy.silence_limit {
+            policy.grace.max(policy.hang_limit)
+        } else {
+            policy.grace
+        }
+    }
+
     /// Returns true if the heartbeats of the process report that it has finished.
     pub(crate) fn reports_finished(&self) -> bool {
         self.current.is_some_and(|health| health.finished != 0)
