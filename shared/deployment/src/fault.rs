@@ -223,7 +223,7 @@ mod tests {
         }
 
         #[test]
-        fn any_text_is_parsed_or_refused(text in "[a-z@+0-9, ]{0,30}") {
+        fn any_text_is_parsed_or_refused(text in "((freeze|unplug|slow|size|back)@[0-9]{1,3}(\\+[0-9]{0,2})?,? ?){0,3}[a-z@+0-9, ]{0,2}") {
             if let Ok(faults) = text.parse::<Faults>() {
                 prop_assert_eq!(faults.to_string().parse::<Faults>().unwrap(), faults);
             }

@@ -89,6 +89,7 @@ pub fn people_from_message(message: &People, n_views: usize) -> Result<FramePeop
 
 #[cfg(test)]
 mod tests {
+    use messages::MAX_VIEWS;
     use proptest::prelude::*;
 
     use super::*;
@@ -150,11 +151,20 @@ mod tests {
     proptest! {
         #[test]
         fn any_message_is_refused_or_names_possible_candidates(
-            n_people in prop_oneof![0_u32..10, any::<u32>()],
-            candidates in prop::array::uniform8(prop::array::uniform16(prop_oneof![Just(NO_CANDIDATE), any::<u8>(), 0_u8..9])),
+            n_people in prop_oneof![9 => 0_u32..9, 1 => any::<u32>()],
+            choices in prop::array::uniform8(prop::array::uniform4((0_u8..60, any::<u8>()))),
         ) {
             let mut message = People { n_people, ..People::default() };
-            for (nth, (slot, candidates)) in message.people.iter_mut().zip(candidates).enumerate() {
+            for (nth, (slot, choices)) in message.people.iter_mut().zip(choices).enumerate() {
+                // Most people have a candidate of their own, or none, and none in the fourth view, which does not exist.
+                let mut candidates = [NO_CANDIDATE; MAX_VIEWS];
+                for (view, (kind, value)) in choices.into_iter().enumerate() {
+                    candidates[view] = match kind {
+                        0 => value,
+                        1..40 if view < 3 => nth as u8,
+                        _ => NO_CANDIDATE,
+                    };
+                }
                 *slot = PersonMessage { id: nth as u64 + 1, candidates };
             }
             if let Ok(frame) = people_from_message(&message, 3) {

@@ -437,9 +437,12 @@ mod tests {
 
         #[test]
         fn any_counts_and_identities_are_refused_or_fit(
-            n_people in prop_oneof![0_u32..10, any::<u32>()],
-            counts in prop::array::uniform8(prop::array::uniform4(prop_oneof![Just(2_u32), Just(3), any::<u32>()])),
-            ids in prop::array::uniform8(0_u64..40),
+            n_people in prop_oneof![9 => 0_u32..10, 1 => any::<u32>()],
+            counts in prop::array::uniform8(prop_oneof![
+                20 => (0_u32..4, 0_u32..33).prop_map(|(n_keypoints, n_parts)| [3, 2, n_keypoints, n_parts]),
+                1 => prop::array::uniform4(prop_oneof![Just(2_u32), Just(3), any::<u32>()]),
+            ]),
+            ids in prop::array::uniform8(0_u64..200),
         ) {
             let mut message = one(&skeleton());
             let (first, others) = message.people.split_at_mut(1);

@@ -70,11 +70,12 @@ pub(crate) fn any_pose() -> impl Strategy<Value = Pose> {
 
 /// Messages of arbitrary bytes, often almost valid.
 pub(crate) fn pose_message() -> impl Strategy<Value = PoseMessage> {
-    let number = || prop_oneof![0_u16..6, any::<u16>()];
+    let number = || prop_oneof![30 => 0_u16..6, 1 => any::<u16>()];
     let cells = || prop::collection::vec(number(), MAX_PARTS);
-    let types = prop::collection::vec(prop_oneof![0_u8..2, any::<u8>()], MAX_PARTS);
-    let parts = prop_oneof![Just(3_u16), any::<u16>()];
-    (any::<u32>(), number(), parts, cells(), cells(), types).prop_map(
+    let types = prop::collection::vec(prop_oneof![30 => 0_u8..2, 1 => any::<u8>()], MAX_PARTS);
+    let parts = prop_oneof![20 => Just(3_u16), 1 => any::<u16>()];
+    let score = prop_oneof![9 => (-9.0_f32..9.0).prop_map(f32::to_bits), 1 => any::<u32>()];
+    (score, number(), parts, cells(), cells(), types).prop_map(
         |(score, level, n_parts, x, y, mixture)| {
             let mut message = PoseMessage {
                 score: f32::from_bits(score),

@@ -189,5 +189,20 @@ mod tests {
         fn no_text_makes_it_panic(text in "[\\PC\t\n]{0,300}") {
             drop(Trc::parse(&text));
         }
+
+        #[test]
+        fn a_changed_file_is_refused_or_has_rows_of_one_length(
+            at in 0..FILE.len(),
+            n in 0_usize..4,
+            to in "[0-9a-z.\t\n-]{0,4}",
+        ) {
+            let mut text = FILE.to_owned();
+            text.replace_range(at..(at + n).min(FILE.len()), &to);
+            if let Ok(trc) = Trc::parse(&text) {
+                prop_assert!(trc.frames.iter().all(|frame| frame.len() == trc.markers.len()));
+                let mut sides = trc.frames.iter().flatten().flatten().flatten();
+                prop_assert!(sides.all(|side| side.is_finite()));
+            }
+        }
     }
 }

@@ -78,12 +78,14 @@ proptest! {
 
     #[test]
     fn any_message_is_refused_or_readable(
-        numbers in prop::collection::vec(any::<u32>(), 16),
+        numbers in prop::collection::vec(prop_oneof![3 => (0.0_f32..1.0).prop_map(f32::to_bits), 1 => any::<u32>()], 8),
+        sides in prop::array::uniform2(prop_oneof![3 => 1_u32..4, 1 => any::<u32>()]),
+        kind in 0_u32..3,
         n in any::<u32>(),
         small in 0_u32..10,
         which in 0_usize..8,
     ) {
-        let mut pose = Sightings { status: Status::OK, ..Sightings::default() };
+        let mut pose = Sightings { status: Status::OK, n_keypoints: 3, ..Sightings::default() };
         let mut header = EvidenceHeader::default();
         let number = |nth: usize| f32::from_bits(numbers[nth]);
         for n in [n, small] {
@@ -91,15 +93,29 @@ proptest! {
             pose.heats[which][3] = number(0);
             pose.joints[which][3] = [number(1), number(2)];
             pose.candidates[which].score = number(3);
-            drop(sightings_from_message(&pose, 3));
-            header.people[which] = GridMessage {
+            if let Ok(Some(view)) = sightings_from_message(&pose, 3) {
+                prop_assert_eq!(view.people.len(), n as usize);
+                for person in &view.people {
+                    prop_assert!(person.heats.iter().all(|heat| (0.0..=1.0).contains(heat)));
+                    prop_assert!(person.joints.iter().flatten().flatten().all(|side| side.is_finite()));
+                    prop_assert!(person.score.is_finite());
+                }
+            }
+            header.people.fill(GridMessage {
                 first_px: [f64::from(number(4)), f64::from(number(5))],
                 cell_px: [f64::from(number(6)), f64::from(number(7))],
-                size: [numbers[8], numbers[9] % 70_000],
-                kind: numbers[11] % 3,
+                size: sides,
+                kind,
                 padding: 0,
-            };
-            drop(maps_from_message(&header, &[number(10)]));
+            });
+            let Ok(grids) = grids_from_message(&header) else { continue };
+            prop_assert_eq!(grids.len(), n as usize);
+            prop_assert!(grids.iter().all(|grid| grid.cell_px.iter().all(|px| px.is_finite() && *px > 0.0)));
+            let values = vec![0.5; n_values(&grids).min(10_000)];
+            if let Ok(maps) = maps_from_message(&header, &values) {
+                let n_read: usize = maps.iter().map(|map| map.values().len()).sum();
+                prop_assert_eq!(n_read, values.len());
+            }
         }
     }
 }
