@@ -130,7 +130,7 @@ impl Trust {
     }
 
     /// Returns the reasons not to trust the results for a person who is not followed. Such a person is often hidden by others, so the limit
-    /// of the reprojection is [`HIDDEN`] times as high.
+    /// of the reprojection is half as high again.
     pub fn doubts_of_another(&self) -> Vec<Doubt> {
         self.doubts_beyond(|kind| {
             let factor = if kind == Kind::Reprojection {
