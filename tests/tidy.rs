@@ -215,7 +215,7 @@ fn files_do_not_import_each_other_in_a_circle() {
 }
 
 /// Largest number of places in the sources that may have the style that the module `dialect` counts. It may only be decreased.
-const DIALECT: usize = 50;
+const DIALECT: usize = 49;
 
 #[test]
 fn outdated_style_decreases() {

@@ -34,18 +34,7 @@ impl Planned {
     ///
     /// Fails if an input cannot be read or used; see [`plan::resolve`] and [`Self::begun`].
     pub fn new(deployment: &Deployment, log: Level) -> Result<Self, Failure> {
-        Self::of(plan::resolve(deployment)?, log)
-    }
-
-    /// Plans the processes and topics of a resolved deployment whose run begins here.
-    ///
-    /// * `log`: the log level of its processes.
-    ///
-    /// # Errors
-    ///
-    /// Fails in the same cases as [`Self::begun`].
-    pub fn of(resolved: Resolved, log: Level) -> Result<Self, Failure> {
-        Self::begun(resolved, log, None)
+        Self::begun(plan::resolve(deployment)?, log, None)
     }
 
     /// Plans the processes and topics of a resolved deployment.

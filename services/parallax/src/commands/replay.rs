@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments, globals: Globals) -> Result<ExitCode, F
     if let Some(text) = recorded::damaged_text(&damaged).filter(|_| !globals.quiet) {
         output::message(text);
     }
-    let planned = Planned::of(resolved, globals.level())?;
+    let planned = Planned::begun(resolved, globals.level(), None)?;
     let stop = Stop::on_signals().or_fail(ExitKind::Run)?;
     let report = planned.run(globals.quiet, &stop, &mut |_| None)?;
     if arguments.json {
