@@ -55,9 +55,9 @@ impl Folder {
         })
     }
 
-    /// Returns true if a run has finished all its files in the folder, under their final names. If a killed process had written all files,
-    /// but had not renamed all of them, they are renamed.
-    pub fn is_finished(dir: &Path, session: u64) -> bool {
+    /// Renames the remaining files of a killed process that had written all its files. Returns true if all files of the run now have their
+    /// final names.
+    pub fn finish_killed(dir: &Path, session: u64) -> bool {
         let read = |name: &str| {
             let text = files::read_text(&dir.join(name), files::SETTINGS).unwrap_or_default();
             RunSummary::parse(&text).ok().filter(|summary| summary.session == session)
@@ -391,18 +391,18 @@ mod tests {
         };
         fs::write(path("pose3d.jsonl"), "renamed").unwrap();
         fs::write(path("times.jsonl.part"), "not yet").unwrap();
-        assert!(!Folder::is_finished(dir.path(), 5), "no summary");
+        assert!(!Folder::finish_killed(dir.path(), 5), "no summary");
         summary.summary.writes_failed = 1;
         write(&summary);
-        assert!(!Folder::is_finished(dir.path(), 5), "lines are missing");
+        assert!(!Folder::finish_killed(dir.path(), 5), "lines are missing");
         summary.summary.writes_failed = 0;
         write(&summary);
-        assert!(!Folder::is_finished(dir.path(), 6), "another run");
-        assert!(Folder::is_finished(dir.path(), 5));
+        assert!(!Folder::finish_killed(dir.path(), 6), "another run");
+        assert!(Folder::finish_killed(dir.path(), 5));
         for (name, text) in [("pose3d.jsonl", "renamed"), ("times.jsonl", "not yet")] {
             assert_eq!(fs::read_to_string(path(name)).unwrap(), text);
         }
-        assert!(Folder::is_finished(dir.path(), 5), "once more");
+        assert!(Folder::finish_killed(dir.path(), 5), "once more");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
     }
 

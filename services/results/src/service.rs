@@ -31,7 +31,7 @@ const AWAIT_PAUSE: Duration = Duration::from_micros(500);
 pub fn run(service: &Service, job: Job) -> Result<(), Failure> {
     let mut waiter = service.bus().waiter();
     let ports = Ports::open(service, &job, &mut waiter)?;
-    if service.epoch() > 0 && Folder::is_finished(&job.output, service.session()) {
+    if service.epoch() > 0 && Folder::finish_killed(&job.output, service.session()) {
         // The process was killed after its work was complete. Starting over would empty the files.
         return ports.rest(service, &waiter);
     }
