@@ -158,12 +158,10 @@ fn of_files(camera: &Camera, capture: &Config) -> Result<Footage, Failure> {
     if let Some(uneven_s) = info.uneven_s.filter(|_| camera.keypoints.is_none()) {
         let file = failure::wording::shell(&camera.source);
         let uneven_ms = 1e3 * uneven_s;
-        let step = capture.frame_step as f64;
-        let rate_hz = info.frame_rate_hz.map_or(30.0, |rate_hz| (rate_hz * step).round());
         tracing::warn!(
             "camera {:?}: the pictures of {} are not evenly spaced in time, by up to {uneven_ms:.0} ms, but pictures of different cameras are \
-             matched by their numbers; if other cameras were recorded in another way, use `ffmpeg -i {file} -vf fps={rate_hz} -c:v libx264 \
-             -crf 15 even.mp4` for every camera",
+             matched by their numbers; if other cameras were recorded in another way, use `ffmpeg -i {file} -vf fps=RATE -c:v libx264 -crf \
+             15 even.mp4` with the same RATE for every camera",
             camera.name,
             camera.source
         );
