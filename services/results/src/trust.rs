@@ -1,6 +1,6 @@
 //! Judges how far the results can be trusted, from the results for the followed person, frame by frame.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use messages::{Sides, SkeletonMessage, Status};
 use nalgebra::Vector3;
@@ -17,10 +17,10 @@ const LONGEST_M: f64 = 1.0;
 const FARTHEST_M: f64 = 0.5;
 /// Speed up to which a larger movement between two results is accepted, in metres per second.
 const FASTEST_M_S: f64 = 6.0;
-/// Distance by which a joint must leave its path to count as jumping, in metres, and the acceleration that no limb reaches, in metres per
-/// second squared: a pitcher's wrist reaches about 500.
+/// Distance by which a joint must leave its path to count as jumping, in metres, and acceleration above which it must do so, in metres per
+/// second squared. Chosen from the runs in docs/guide/run.md.
 const OFF_PATH_M: f64 = 0.15;
-const FASTEST_M_S2: f64 = 500.0;
+const LEAST_M_S2: f64 = 500.0;
 /// Maximum time from the first to the last of the three results with which a path is judged, in seconds.
 const PATH_S: f64 = 0.2;
 /// Ratio of the standard deviation to the median absolute deviation, for normally distributed errors.
@@ -59,7 +59,7 @@ pub(crate) struct Trusted {
     last: Option<(f64, Vector3<f64>)>,
     n_jumps: u64,
     /// The last two results: time in seconds, and positions of the joints.
-    path: VecDeque<Instant>,
+    path: [Option<Instant>; 2],
     n_limb_jumps: u64,
     warned: Vec<Doubt>,
 }
@@ -166,23 +166,20 @@ impl Trusted {
     fn limbs_moved(&mut self, pose: &SkeletonMessage, time_s: f64) {
         let joints = (0..pose.n_joints as usize).map(|joint| place(pose, joint)).collect();
         let now = Instant { time_s, joints };
-        if let [first, middle] = self.path.make_contiguous()
+        if let [Some(first), Some(middle)] = &self.path
             && (f64::EPSILON..PATH_S).contains(&(time_s - first.time_s))
         {
             let share = (middle.time_s - first.time_s) / (time_s - first.time_s);
-            let least_s2 = (middle.time_s - first.time_s) * (time_s - middle.time_s) / 2.0;
-            let limit_m = OFF_PATH_M.max(FASTEST_M_S2 * least_s2);
+            let half_s2 = (middle.time_s - first.time_s) * (time_s - middle.time_s) / 2.0;
+            let limit_m = OFF_PATH_M.max(LEAST_M_S2 * half_s2);
             let joints = first.joints.iter().zip(&middle.joints).zip(&now.joints);
-            let is_off = joints.filter_map(|((first, middle), last)| {
+            let mut is_off = joints.filter_map(|((first, middle), last)| {
                 let between = first.as_ref()?.lerp(last.as_ref()?, share);
                 Some((middle.as_ref()? - between).norm() > limit_m)
             });
-            self.n_limb_jumps += u64::from(is_off.into_iter().any(|is_off| is_off));
+            self.n_limb_jumps += u64::from(is_off.any(|is_off| is_off));
         }
-        self.path.push_back(now);
-        while self.path.len() > 2 {
-            self.path.pop_front();
-        }
+        self.path = [self.path[1].take(), Some(now)];
     }
 
     /// Returns the scatter (standard deviation) of the bone lengths, in metres.
@@ -350,7 +347,7 @@ mod tests {
             for nth in 0..20 {
                 let mut pose = result(Sides::SURE);
                 let off_m = if nth == 10 { off_m } else { 0.0 };
-                // 20 m/s, like the wrist of a pitcher.
+                // 20 m/s on a straight line.
                 let time_s = f64::from(nth) / rate_hz;
                 pose.joints[0].in_world = [20.0 * time_s, off_m, 0.0];
                 trusted.add(Some(&pose), &[(0, 1)], (Some(time_s), &[]));

@@ -175,7 +175,7 @@ fn readings<'a>(
     })
 }
 
-/// Returns the mean of the finite distances, so that a candidate with few of the joints is not nearer for that; infinite if there is none.
+/// Returns the mean of the finite distances; infinite if there is none. A sum would favour candidates with few joints.
 fn mean(distances: &[f64]) -> f64 {
     let known = distances.iter().filter(|distance| distance.is_finite());
     let (n, sum) = known.fold((0_u32, 0.0), |(n, sum), distance| (n + 1, sum + distance));

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::nullable::nullable;
 
 /// Limit of the reprojection for people who are not followed, as a multiple of the limit for the followed person. In 16 runs with four
-/// synthetic people each, the largest of 69 values was 0.91 of the limit (docs/guide/run.md).
+/// or five synthetic people, the largest value of 69 ids was 0.91 of the limit (docs/guide/run.md).
 const HIDDEN: f64 = 1.5;
 
 /// Measures of the quality of results, computed from the results alone. Fractions are from 0 to 1.
@@ -33,7 +33,7 @@ pub struct Trust {
     /// Fraction of the results in which the middle of the body is farther from the middle in the previous result than a person can have
     /// moved.
     pub jumps: f64,
-    /// Fraction of the results in which a joint leaves its path by more than 0.15 m, faster than any limb can move.
+    /// Fraction of the results in which a joint leaves its path by more than 0.15 m, with more than 500 m/s².
     pub limb_jumps: f64,
     /// Distance of the joints' reprojections from the views' observations, as a fraction of the person's height in the frames: median
     /// over all joints, so that joints that other people or things hide have little effect.
@@ -208,8 +208,8 @@ impl fmt::Display for Doubt {
             ),
             Kind::LimbJumps => write!(
                 f,
-                "a joint jumps out of its path in {value:.0} % of the results (limit {limit:.0} %), faster than any limb moves: limbs are \
-                 hidden or taken for others, or frames of a camera are out of order"
+                "a joint jumps out of its path in {value:.0} % of the results (limit {limit:.0} %): limbs are hidden or taken for others, or \
+                 frames of a camera are out of order"
             ),
             Kind::Implausible => write!(
                 f,
